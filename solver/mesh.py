@@ -1,0 +1,147 @@
+"""Triangle meshes as two arrays, with the geometry that every later stage reads from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.intp]
+Booleans = npt.NDArray[np.bool_]
+Complexes = npt.NDArray[np.complex128]
+
+
+class MeshError(ValueError):
+    """A mesh cannot be used as it is; the text is one sentence that begins with the mesh's quoted name."""
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """An indexed triangle mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Positions in any length unit.
+    faces : (m, 3) integer
+        Vertex indices of each triangle, counter-clockwise seen from outside.
+    name : str
+        What error messages call the mesh.
+
+    Raises
+    ------
+    MeshError
+        Wrong shapes, no vertices or faces, a position that is not finite, an index out of range.
+
+    Examples
+    --------
+    >>> TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).area
+    0.5
+    """
+
+    vertices: Floats
+    faces: Integers
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        faces = np.asarray(self.faces)
+        if vertices.size == 0:
+            raise MeshError(f"'{self.name}' has no vertices")
+        if faces.size == 0:
+            raise MeshError(f"'{self.name}' has no faces")
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise MeshError(f"'{self.name}' needs vertices of shape (n, 3), not {vertices.shape}")
+        if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+            raise MeshError(
+                f"'{self.name}' needs integer faces of shape (m, 3), not {faces.dtype} {faces.shape}"
+            )
+        bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        if bad.size:
+            raise MeshError(
+                f"'{self.name}' has {plural(bad.size, 'vertex')} whose position is not a finite "
+                f"number (the first is vertex {bad[0]}): delete or repair {'it' if bad.size == 1 else 'them'}"
+            )
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise MeshError(
+                f"'{self.name}' has faces that name vertices outside 0 to {len(vertices) - 1}: the file is damaged"
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", np.ascontiguousarray(faces, dtype=np.intp))
+
+    @cached_property
+    def face_vectors(self) -> Floats:
+        """Cross product of two sides per face, (m, 3): the face normal times twice the area."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> Floats:
+        """Area of each face, (m,), in squared length units."""
+        return 0.5 * np.linalg.norm(self.face_vectors, axis=1)
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the surface, in squared length units."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def vertex_areas(self) -> Floats:
+        """Barycentric dual area of each vertex, (n,): a third of the faces around it."""
+        return np.bincount(
+            self.faces.ravel(), np.repeat(self.face_areas / 3, 3), minlength=len(self.vertices)
+        )
+
+    @cached_property
+    def edge_lengths(self) -> Floats:
+        """Length of the side opposite each corner, (m, 3), in length units."""
+        corners = self.vertices[self.faces]
+        return np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+
+    @cached_property
+    def edges(self) -> Integers:
+        """Undirected edges, (e, 2), each once, smaller index first."""
+        pairs = np.sort(directed_edges(self.faces), axis=1)
+        keys = np.unique(pairs[:, 0] * len(self.vertices) + pairs[:, 1])
+        return np.stack(np.divmod(keys, len(self.vertices)), axis=1)
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box diagonal of the vertices in use, in length units."""
+        used = self.vertices[np.unique(self.faces)]
+        return float(np.linalg.norm(np.ptp(used, axis=0)))
+
+    def vertex_normals(self) -> Floats:
+        """Unit normal of each vertex, (n, 3), area weighted; zero at vertices in no face."""
+        total = np.stack(
+            [
+                np.bincount(self.faces.ravel(), np.repeat(component, 3), minlength=len(self.vertices))
+                for component in self.face_vectors.T
+            ],
+            axis=1,
+        )
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+
+def directed_edges(faces: Integers) -> Integers:
+    """Return the three sides of each face in its own direction, (3 m, 2); row 3 f + k is opposite corner k.
+
+    >>> directed_edges(np.array([[7, 8, 9]])).tolist()
+    [[8, 9], [9, 7], [7, 8]]
+    """
+    return np.stack([faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]], axis=2).reshape(-1, 2)
+
+
+def plural(number: int, noun: str) -> str:
+    """Return the number with its noun: '1 face', '2,000 vertices'.
+
+    >>> plural(1, "face"), plural(2000, "vertex")
+    ('1 face', '2,000 vertices')
+    """
+    if number == 1:
+        return f"1 {noun}"
+    return f"{number:,} {noun[:-2] + 'ices' if noun.endswith('vertex') else noun + 's'}"

@@ -1,0 +1,234 @@
+"""What a mesh is: parts, boundary loops, Euler characteristic, and everything that keeps it from being a disc."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from .mesh import Integers, MeshError, TriangleMesh, directed_edges, plural
+
+
+@dataclass(frozen=True)
+class Topology:
+    """The topology of a mesh, as `topology` finds it.
+
+    Attributes
+    ----------
+    vertices : int
+        Vertices in use.
+    parts : int
+        Connected components (faces that share a vertex are connected).
+    boundary_loops : tuple of (k,) int arrays
+        Vertex indices in the order of the surface's boundary orientation, most edges first.
+    loop_lengths : tuple of float
+        Length of each loop, in the mesh's length unit.
+    euler_characteristic : int
+        Vertices in use - edges + faces; 1 for a disc.
+    non_manifold_edges : (k, 2) int
+        Edges of three or more faces.
+    non_manifold_vertices : (k,) int
+        Vertices whose faces form more than one fan.
+    degenerate_faces : (k,) int
+        Faces that name a vertex twice.
+    zero_area_faces : (k,) int
+        Other faces without area; they are no obstacle.
+    duplicate_faces : (k,) int
+        Faces on the same three vertices as an earlier one.
+    unused_vertices : (k,) int
+        Vertices in no face; they are no obstacle.
+    inconsistent_edges : (k, 2) int
+        Edges that both of their faces run through in the same direction.
+    """
+
+    vertices: int
+    parts: int
+    boundary_loops: tuple[Integers, ...]
+    loop_lengths: tuple[float, ...]
+    euler_characteristic: int
+    non_manifold_edges: Integers
+    non_manifold_vertices: Integers
+    degenerate_faces: Integers
+    zero_area_faces: Integers
+    duplicate_faces: Integers
+    unused_vertices: Integers
+    inconsistent_edges: Integers
+
+    @property
+    def is_disc(self) -> bool:
+        """Whether the mesh is a triangulated disc: nothing in `problems`."""
+        return not self.problems()
+
+    def problems(self) -> tuple[str, ...]:
+        """Return what keeps the mesh from being a disc, each as the rest of a sentence, with what to do about it."""
+        found: list[str] = []
+        if n := len(self.degenerate_faces):
+            found.append(f"has {plural(n, 'face')} that use a vertex twice: merge by distance or delete them")
+        if n := len(self.duplicate_faces):
+            found.append(f"has {plural(n, 'duplicate face')}: delete them")
+        if n := len(self.non_manifold_edges):
+            found.append(f"has {plural(n, 'edge')} in three or more faces: delete the extra faces")
+        if n := len(self.inconsistent_edges):
+            found.append(
+                f"has faces that disagree about the outside ({plural(n, 'edge')}): recalculate the normals"
+            )
+        if n := len(self.non_manifold_vertices):
+            found.append(f"has {plural(n, 'vertex')} where parts touch in a point only: split them")
+        if self.parts > 1:
+            found.append(f"has {self.parts:,} separate parts: keep one (Separate by Loose Parts)")
+        if found:
+            return tuple(found)
+        loops = len(self.boundary_loops)
+        if loops == 0:
+            found.append("is closed (it has no boundary): delete some faces to open it into a disc")
+        elif loops > 1:
+            edges = [f"{len(loop):,}" for loop in self.boundary_loops]
+            listed = (
+                f"{', '.join(edges[:-1])} and {edges[-1]}" if loops <= 6 else f"{', '.join(edges[:5])}, ..."
+            )
+            found.append(f"has {loops:,} boundary loops ({listed} edges): fill all but the outer one")
+        if self.handles:
+            found.append(f"has {plural(self.handles, 'handle')} like a torus: cut through and fill")
+        return tuple(found)
+
+    @property
+    def handles(self) -> int:
+        """Genus of an orientable manifold mesh in one part; 0 for discs and spheres."""
+        return (2 * self.parts - len(self.boundary_loops) - self.euler_characteristic) // 2
+
+    def describe(self) -> str:
+        """Return one line that says what the mesh is."""
+        problems = self.problems()
+        if problems:
+            return "not a disc: it " + "; it ".join(problems)
+        text = f"disc, {self.vertices:,} vertices, boundary of {len(self.boundary_loops[0]):,} edges"
+        if n := len(self.unused_vertices):
+            text += f", {plural(n, 'loose vertex')}"
+        if n := len(self.zero_area_faces):
+            text += f", {plural(n, 'face')} without area"
+        return text
+
+
+def topology(mesh: TriangleMesh) -> Topology:
+    """Return what `mesh` is. Nothing is assumed of the mesh.
+
+    >>> topology(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])).describe()
+    'disc, 3 vertices, boundary of 3 edges'
+    """
+    n, faces = len(mesh.vertices), mesh.faces
+    degenerate = (faces == faces[:, [1, 2, 0]]).any(axis=1)
+    order = np.sort(faces, axis=1)
+    _, first = np.unique(order, axis=0, return_index=True)
+    duplicate = np.ones(len(faces), bool)
+    duplicate[first] = False
+    proper = ~degenerate & ~duplicate
+    scale = mesh.edge_lengths.max(axis=1)
+    flat = proper & (mesh.face_areas <= 1e-12 * scale**2)
+
+    simple = faces[proper]
+    sides = directed_edges(simple)
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    edge_keys, edge_of_side, side_count = np.unique(low * n + high, return_inverse=True, return_counts=True)
+    forward = np.bincount(edge_of_side, sides[:, 0] < sides[:, 1], minlength=len(edge_keys))
+    edges = np.stack(np.divmod(edge_keys, n), axis=1)
+
+    used = np.zeros(n, bool)
+    used[faces] = True
+    joined = coo_array((np.ones(len(sides), np.int8), (sides[:, 0], sides[:, 1])), shape=(n, n))
+    label = connected_components(joined, directed=False)[1]
+    in_proper = np.zeros(n, bool)
+    in_proper[simple] = True
+    parts = len(np.unique(label[in_proper]))
+
+    fan_of_corner = _fans(simple, edge_of_side, side_count)
+    corner_vertex = simple.ravel()
+    pairs = np.unique(np.stack([corner_vertex, fan_of_corner], axis=1), axis=0)
+    fans = np.bincount(pairs[:, 0], minlength=n)
+
+    loops = _boundary_loops(simple, fan_of_corner, np.flatnonzero(side_count[edge_of_side] == 1))
+    lengths = [
+        float(np.linalg.norm(mesh.vertices[x] - mesh.vertices[np.roll(x, -1)], axis=1).sum()) for x in loops
+    ]
+    ranked = sorted(range(len(loops)), key=lambda k: (-len(loops[k]), -lengths[k]))
+    return Topology(
+        vertices=int(used.sum()),
+        parts=parts,
+        boundary_loops=tuple(loops[k] for k in ranked),
+        loop_lengths=tuple(lengths[k] for k in ranked),
+        euler_characteristic=int(in_proper.sum()) - len(edges) + len(simple),
+        non_manifold_edges=edges[side_count > 2],
+        non_manifold_vertices=np.flatnonzero(fans > 1),
+        degenerate_faces=np.flatnonzero(degenerate),
+        zero_area_faces=np.flatnonzero(flat),
+        duplicate_faces=np.flatnonzero(duplicate & ~degenerate),
+        unused_vertices=np.flatnonzero(~used),
+        inconsistent_edges=edges[(side_count == 2) & (forward != 1)],
+    )
+
+
+def require_disc(mesh: TriangleMesh) -> Topology:
+    """Return the topology of a mesh that must be a disc.
+
+    Raises
+    ------
+    MeshError
+        It is none; the text names the mesh and everything that is in the way.
+    """
+    found = topology(mesh)
+    if problems := found.problems():
+        raise MeshError(f"'{mesh.name}' " + "; it ".join(problems))
+    return found
+
+
+def _fans(faces: Integers, edge_of_side: Integers, side_count: Integers) -> Integers:
+    """Label each corner, (3 m,), so that corners of one vertex agree if edges of two or more faces connect them."""
+    side_edge = edge_of_side.reshape(-1, 3)
+    corners = np.arange(faces.size).reshape(-1, 3)
+    ends: list[Integers] = []
+    for end in (1, 2):  # side k of a face runs from corner k + 1 to corner k + 2
+        corner = np.roll(corners, -end, axis=1)
+        # a node per (edge, vertex): every corner of that vertex beside that edge hangs on it
+        vertex = np.roll(faces, -end, axis=1)
+        other = np.roll(faces, -(3 - end), axis=1)
+        node = 2 * side_edge + (vertex < other)
+        ends.append(np.stack([corner.ravel(), node.ravel()], axis=1))
+    links = np.concatenate(ends)
+    links = links[side_count[links[:, 1] // 2] >= 2]
+    total = faces.size + 2 * len(side_count)
+    graph = coo_array(
+        (np.ones(len(links), np.int8), (links[:, 0], faces.size + links[:, 1])), shape=(total, total)
+    )
+    return connected_components(graph, directed=False)[1][: faces.size].astype(np.intp)
+
+
+def _boundary_loops(faces: Integers, fan_of_corner: Integers, boundary_sides: Integers) -> list[Integers]:
+    """Chain boundary sides into loops of vertex indices; a vertex in two fans is passed once per fan."""
+    corner = np.arange(faces.size).reshape(-1, 3)
+    start = fan_of_corner[np.roll(corner, -1, axis=1).ravel()[boundary_sides]]
+    stop = fan_of_corner[np.roll(corner, -2, axis=1).ravel()[boundary_sides]]
+    vertex = {
+        int(f): int(v) for f, v in zip(start, np.roll(faces, -1, axis=1).ravel()[boundary_sides], strict=True)
+    }
+    vertex |= {
+        int(f): int(v) for f, v in zip(stop, np.roll(faces, -2, axis=1).ravel()[boundary_sides], strict=True)
+    }
+    # neighbours in side direction first, so that a consistently oriented boundary keeps its direction
+    neighbours: dict[int, list[int]] = {f: [] for f in vertex}
+    for a, b in zip(start.tolist(), stop.tolist(), strict=True):
+        neighbours[a].insert(0, b)
+        neighbours[b].append(a)
+    seen: set[int] = set()
+    loops: list[Integers] = []
+    for first in neighbours:
+        if first in seen:
+            continue
+        loop, here = [first], first
+        seen.add(first)
+        while (ahead := next((f for f in neighbours[here] if f not in seen), None)) is not None:
+            loop.append(ahead)
+            seen.add(ahead)
+            here = ahead
+        loops.append(np.array([vertex[f] for f in loop], dtype=np.intp))
+    return loops
