@@ -95,9 +95,7 @@ def _with_interior(mesh: TriangleMesh, loop: Integers) -> TriangleMesh:
     first = len(mesh.vertices)
     middle = first + np.arange(rim.sum())
     a, b, c = mesh.faces[rim].T
-    thirds = np.concatenate(
-        [np.stack(corners, axis=1) for corners in ((a, b, middle), (b, c, middle), (c, a, middle))]
-    )
+    thirds = np.concatenate([np.stack(corners, axis=1) for corners in ((a, b, middle), (b, c, middle), (c, a, middle))])
     return TriangleMesh(
         np.concatenate([mesh.vertices, mesh.vertices[mesh.faces[rim]].mean(axis=1)]),
         np.concatenate([mesh.faces[~rim], thirds]),
@@ -129,9 +127,7 @@ def _harmonic(mesh: TriangleMesh, loop: Integers) -> Complexes:
 
 def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
     """Return the solver of a sparse symmetric positive definite system."""
-    return splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    ).solve
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
 
 
 def _farthest_from(mesh: TriangleMesh, loop: Integers, interior: Integers) -> int:

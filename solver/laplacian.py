@@ -25,9 +25,7 @@ def cotangents(lengths: Floats) -> Floats:
     # Kahan's arrangement of Heron's formula keeps its digits on needles
     area = 0.25 * np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0))
     square = lengths**2
-    return (square.sum(axis=1, keepdims=True) - 2 * square) / (
-        4 * np.maximum(area, np.finfo(float).tiny)[:, None]
-    )
+    return (square.sum(axis=1, keepdims=True) - 2 * square) / (4 * np.maximum(area, np.finfo(float).tiny)[:, None])
 
 
 def cotangent_laplacian(faces: Integers, lengths: Floats, vertex_count: int) -> csr_array:

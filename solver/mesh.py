@@ -56,9 +56,7 @@ class TriangleMesh:
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise MeshError(f"'{self.name}' needs vertices of shape (n, 3), not {vertices.shape}")
         if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
-            raise MeshError(
-                f"'{self.name}' needs integer faces of shape (m, 3), not {faces.dtype} {faces.shape}"
-            )
+            raise MeshError(f"'{self.name}' needs integer faces of shape (m, 3), not {faces.dtype} {faces.shape}")
         bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
         if bad.size:
             raise MeshError(
@@ -91,9 +89,7 @@ class TriangleMesh:
     @cached_property
     def vertex_areas(self) -> Floats:
         """Barycentric dual area of each vertex, (n,): a third of the faces around it."""
-        return np.bincount(
-            self.faces.ravel(), np.repeat(self.face_areas / 3, 3), minlength=len(self.vertices)
-        )
+        return np.bincount(self.faces.ravel(), np.repeat(self.face_areas / 3, 3), minlength=len(self.vertices))
 
     @cached_property
     def edge_lengths(self) -> Floats:

@@ -71,9 +71,7 @@ class Topology:
         if n := len(self.non_manifold_edges):
             found.append(f"has {plural(n, 'edge')} in three or more faces: delete the extra faces")
         if n := len(self.inconsistent_edges):
-            found.append(
-                f"has faces that disagree about the outside ({plural(n, 'edge')}): recalculate the normals"
-            )
+            found.append(f"has faces that disagree about the outside ({plural(n, 'edge')}): recalculate the normals")
         if n := len(self.non_manifold_vertices):
             found.append(f"has {plural(n, 'vertex')} where parts touch in a point only: split them")
         if self.parts > 1:
@@ -85,9 +83,7 @@ class Topology:
             found.append("is closed (it has no boundary): delete some faces to open it into a disc")
         elif loops > 1:
             edges = [f"{len(loop):,}" for loop in self.boundary_loops]
-            listed = (
-                f"{', '.join(edges[:-1])} and {edges[-1]}" if loops <= 6 else f"{', '.join(edges[:5])}, ..."
-            )
+            listed = f"{', '.join(edges[:-1])} and {edges[-1]}" if loops <= 6 else f"{', '.join(edges[:5])}, ..."
             found.append(f"has {loops:,} boundary loops ({listed} edges): fill all but the outer one")
         if self.handles:
             found.append(f"has {plural(self.handles, 'handle')} like a torus: cut through and fill")
@@ -148,9 +144,7 @@ def topology(mesh: TriangleMesh) -> Topology:
     fans = np.bincount(pairs[:, 0], minlength=n)
 
     loops = _boundary_loops(simple, fan_of_corner, np.flatnonzero(side_count[edge_of_side] == 1))
-    lengths = [
-        float(np.linalg.norm(mesh.vertices[x] - mesh.vertices[np.roll(x, -1)], axis=1).sum()) for x in loops
-    ]
+    lengths = [float(np.linalg.norm(mesh.vertices[x] - mesh.vertices[np.roll(x, -1)], axis=1).sum()) for x in loops]
     ranked = sorted(range(len(loops)), key=lambda k: (-len(loops[k]), -lengths[k]))
     return Topology(
         vertices=int(used.sum()),
@@ -197,9 +191,7 @@ def _fans(faces: Integers, edge_of_side: Integers, side_count: Integers) -> Inte
     links = np.concatenate(ends)
     links = links[side_count[links[:, 1] // 2] >= 2]
     total = faces.size + 2 * len(side_count)
-    graph = coo_array(
-        (np.ones(len(links), np.int8), (links[:, 0], faces.size + links[:, 1])), shape=(total, total)
-    )
+    graph = coo_array((np.ones(len(links), np.int8), (links[:, 0], faces.size + links[:, 1])), shape=(total, total))
     return connected_components(graph, directed=False)[1][: faces.size].astype(np.intp)
 
 
@@ -208,12 +200,8 @@ def _boundary_loops(faces: Integers, fan_of_corner: Integers, boundary_sides: In
     corner = np.arange(faces.size).reshape(-1, 3)
     start = fan_of_corner[np.roll(corner, -1, axis=1).ravel()[boundary_sides]]
     stop = fan_of_corner[np.roll(corner, -2, axis=1).ravel()[boundary_sides]]
-    vertex = {
-        int(f): int(v) for f, v in zip(start, np.roll(faces, -1, axis=1).ravel()[boundary_sides], strict=True)
-    }
-    vertex |= {
-        int(f): int(v) for f, v in zip(stop, np.roll(faces, -2, axis=1).ravel()[boundary_sides], strict=True)
-    }
+    vertex = {int(f): int(v) for f, v in zip(start, np.roll(faces, -1, axis=1).ravel()[boundary_sides], strict=True)}
+    vertex |= {int(f): int(v) for f, v in zip(stop, np.roll(faces, -2, axis=1).ravel()[boundary_sides], strict=True)}
     # neighbours in side direction first, so that a consistently oriented boundary keeps its direction
     neighbours: dict[int, list[int]] = {f: [] for f in vertex}
     for a, b in zip(start.tolist(), stop.tolist(), strict=True):
