@@ -1,8 +1,8 @@
 """The conformal map of a triangulated disc to the unit disc.
 
 The Green's function of the cotangent Laplacian with its pole at an interior vertex and zero on the boundary has the
-harmonic measure as its flux through the boundary; the cumulated flux is the boundary angle of the Riemann map that takes
-the pole to the centre, and the harmonic extension of that boundary is the map. One factorisation serves all of it.
+harmonic measure as its flux through the boundary; the cumulated flux is the boundary angle of the Riemann map that
+takes the pole to the centre, and the harmonic extension of that boundary is the map. One factorisation serves it all.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ def flatten(mesh: TriangleMesh, method: str = "harmonic") -> Flattening:
     used = np.unique(mesh.faces)
     centring = Mobius(conformal_barycentre(disc[used], mesh.vertex_areas[used]), 0.0)
     centred = np.full(len(disc), complex(np.nan, np.nan))
-    centred[used] = centring(disc[used])
-    centred /= np.maximum(np.abs(centred), 1)
+    moved = centring(disc[used])
+    centred[used] = moved / np.maximum(np.abs(moved), 1)
     centred[boundary] /= np.abs(centred[boundary])
     return Flattening(mesh, centred, boundary)
 

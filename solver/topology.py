@@ -65,7 +65,7 @@ class Topology:
         """Return what keeps the mesh from being a disc, each as the rest of a sentence, with what to do about it."""
         found: list[str] = []
         if n := len(self.degenerate_faces):
-            found.append(f"has {plural(n, 'face')} that use a vertex twice: merge by distance or delete them")
+            found.append(f"has {plural(n, 'face')} with a vertex used twice: merge by distance or delete them")
         if n := len(self.duplicate_faces):
             found.append(f"has {plural(n, 'duplicate face')}: delete them")
         if n := len(self.non_manifold_edges):
