@@ -8,15 +8,19 @@ values (`interpolate`).
 from .flatten import Flattening, flatten
 from .mesh import MeshError, TriangleMesh
 from .mobius import Mobius
+from .search import SearchProgress, SearchResult, search
 from .topology import Topology, require_disc, topology
 
 __all__ = [
     "Flattening",
     "MeshError",
     "Mobius",
+    "SearchProgress",
+    "SearchResult",
     "Topology",
     "TriangleMesh",
     "flatten",
     "require_disc",
+    "search",
     "topology",
 ]
