@@ -45,8 +45,7 @@ def stab(
     event_group = event_owner // points
 
     # rises before falls at equal angles: the arcs are closed
-    order = np.argsort(event_theta, kind="stable")
-    order = order[np.argsort(event_group[order], kind="stable")]
+    order = np.lexsort([event_rise < 0, event_theta, event_group])
     event_group, event_theta, event_rise = event_group[order], event_theta[order], event_rise[order]
     level = np.cumsum(event_rise)
     first = np.flatnonzero(np.diff(event_group, prepend=-1))
