@@ -89,8 +89,8 @@ def _envelope(owner: Integers, start: Floats, stop: Floats, weight: Floats) -> t
     order = np.lexsort([falling, theta, both])
     rank = np.empty(2 * n, np.intp)
     rank[order] = np.arange(2 * n)
-    # slot s lies between events s and s + 1; an interval covers the slots from its start to before its stop. The maximum
-    # over all intervals on each slot comes from a sparse table, filled at two places per interval and pushed down.
+    # slot s lies between events s and s + 1; an interval covers the slots from its start to before its stop. The
+    # maximum over all intervals on each slot comes from a sparse table, filled at two places per interval and pushed down.
     low, length = rank[:n], rank[n:] - rank[:n]
     power = np.frexp(length.astype(np.float64))[1] - 1
     covered = np.zeros(2 * n)

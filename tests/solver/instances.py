@@ -88,7 +88,7 @@ def hypotheses(problem: Matching, z_max: float) -> np.ndarray:
 
 
 def brute_force(problem: Matching, z_max: float, steps: int) -> float:
-    """The best value over a fine grid of z and all pair hypotheses, every theta exactly (a lower bound of the optimum)."""
+    """The best value over a fine grid of z and pair hypotheses, every theta exactly: a lower bound of the optimum."""
     axis = np.linspace(-z_max, z_max, steps)
     z = (axis[:, None] + 1j * axis).ravel()
     z = np.concatenate([z[np.abs(z) <= z_max], hypotheses(problem, z_max)])
