@@ -12,9 +12,9 @@ def mollified_lengths(lengths: Floats, relative: float = 1e-6) -> Floats:
     """Return side lengths, (m, 3), grown by one small constant until every triangle has area.
 
     Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020), section 4.5: the smallest constant that makes
-    each triangle inequality hold with a margin of `relative` times the mean length; zero for a clean mesh.
+    each triangle inequality hold with a margin of `relative` times the triangle's longest side; zero for a clean mesh.
     """
-    margin = relative * lengths.mean()
+    margin = relative * np.maximum(lengths.max(axis=1), relative * lengths.mean())
     lack = margin + 2 * lengths.max(axis=1) - lengths.sum(axis=1)
     return lengths + max(0.0, float(lack.max()))
 

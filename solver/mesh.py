@@ -73,13 +73,14 @@ class TriangleMesh:
     @cached_property
     def face_vectors(self) -> Floats:
         """Cross product of two sides per face, (m, 3): the face normal times twice the area."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return np.cross(b - a, c - a)
+        a = self.vertices[self.faces[:, 0]]
+        (ux, uy, uz), (vx, vy, vz) = ((self.vertices[self.faces[:, k]] - a).T for k in (1, 2))
+        return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
 
     @cached_property
     def face_areas(self) -> Floats:
         """Area of each face, (m,), in squared length units."""
-        return 0.5 * np.linalg.norm(self.face_vectors, axis=1)
+        return 0.5 * np.sqrt((self.face_vectors**2).sum(axis=1))
 
     @cached_property
     def area(self) -> float:
@@ -89,20 +90,30 @@ class TriangleMesh:
     @cached_property
     def vertex_areas(self) -> Floats:
         """Barycentric dual area of each vertex, (n,): a third of the faces around it."""
-        return np.bincount(self.faces.ravel(), np.repeat(self.face_areas / 3, 3), minlength=len(self.vertices))
+        third = np.repeat(self.face_areas / 3, 3)
+        return np.bincount(self.faces.ravel(), third, len(self.vertices)).astype(np.float64, copy=False)
 
     @cached_property
     def edge_lengths(self) -> Floats:
         """Length of the side opposite each corner, (m, 3), in length units."""
-        corners = self.vertices[self.faces]
-        return np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+        low, high = self.edges.T
+        difference = self.vertices[low] - self.vertices[high]
+        length: Floats = np.sqrt((difference**2).sum(axis=1))
+        return length[self.edge_of_side].reshape(-1, 3)
 
-    @cached_property
+    @property
     def edges(self) -> Integers:
         """Undirected edges, (e, 2), each once, smaller index first."""
-        pairs = np.sort(directed_edges(self.faces), axis=1)
-        keys = np.unique(pairs[:, 0] * len(self.vertices) + pairs[:, 1])
-        return np.stack(np.divmod(keys, len(self.vertices)), axis=1)
+        return self._edges_of_sides[0]
+
+    @property
+    def edge_of_side(self) -> Integers:
+        """Row in `edges` of each side, (3 m,); side 3 f + k is opposite corner k of face f."""
+        return self._edges_of_sides[1]
+
+    @cached_property
+    def _edges_of_sides(self) -> tuple[Integers, Integers]:
+        return edges_of_sides(self.faces, len(self.vertices))
 
     @property
     def diagonal(self) -> float:
@@ -130,6 +141,25 @@ def directed_edges(faces: Integers) -> Integers:
     [[8, 9], [9, 7], [7, 8]]
     """
     return np.stack([faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]], axis=2).reshape(-1, 2)
+
+
+def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
+    """Return undirected edges, (e, 2), each once, sorted, and the edge of each side in `directed_edges`, (3 m,)."""
+    start, stop = directed_edges(faces).T
+    keys = np.minimum(start, stop) * vertex_count + np.maximum(start, stop)
+    edges, edge_of_side = np.unique(keys, return_inverse=True)
+    return np.stack(np.divmod(edges, vertex_count), axis=1), edge_of_side.reshape(-1)
+
+
+def twin_sides(edge_of_side: Integers) -> Integers:
+    """Return the other side of each side's edge, (3 m,), -1 on the boundary, where no edge has three sides.
+
+    >>> twin_sides(edges_of_sides(np.array([[0, 1, 2], [2, 1, 3]]), 4)[1]).tolist()
+    [5, -1, -1, -1, -1, 0]
+    """
+    side = np.arange(len(edge_of_side))
+    both = np.bincount(edge_of_side, side).astype(np.intp)[edge_of_side]
+    return np.where(np.bincount(edge_of_side)[edge_of_side] == 2, both - side, -1)
 
 
 def plural(number: int, noun: str) -> str:

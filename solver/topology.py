@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from .mesh import Integers, MeshError, TriangleMesh, directed_edges, plural
+from .mesh import Booleans, Integers, MeshError, TriangleMesh, directed_edges, edges_of_sides, plural
 
 
 @dataclass(frozen=True)
@@ -115,33 +115,34 @@ def topology(mesh: TriangleMesh) -> Topology:
     """
     n, faces = len(mesh.vertices), mesh.faces
     degenerate = (faces == faces[:, [1, 2, 0]]).any(axis=1)
-    order = np.sort(faces, axis=1)
-    _, first = np.unique(order, axis=0, return_index=True)
+    # three vertices are an edge and the smallest vertex, which is opposite it
+    corner = np.argmin(faces, axis=1)
+    rows = np.arange(len(faces))
+    _, first = np.unique(mesh.edge_of_side[3 * rows + corner] * n + faces[rows, corner], return_index=True)
     duplicate = np.ones(len(faces), bool)
     duplicate[first] = False
     proper = ~degenerate & ~duplicate
-    scale = mesh.edge_lengths.max(axis=1)
-    flat = proper & (mesh.face_areas <= 1e-12 * scale**2)
+    flat = proper & (mesh.face_areas <= 1e-12 * mesh.edge_lengths.max(axis=1) ** 2)
 
     simple = faces[proper]
+    edges, edge_of_side = (mesh.edges, mesh.edge_of_side) if proper.all() else edges_of_sides(simple, n)
     sides = directed_edges(simple)
-    low, high = sides.min(axis=1), sides.max(axis=1)
-    edge_keys, edge_of_side, side_count = np.unique(low * n + high, return_inverse=True, return_counts=True)
-    forward = np.bincount(edge_of_side, sides[:, 0] < sides[:, 1], minlength=len(edge_keys))
-    edges = np.stack(np.divmod(edge_keys, n), axis=1)
+    ascending = sides[:, 0] < sides[:, 1]
+    side_count = np.bincount(edge_of_side, minlength=len(edges))
+    forward = np.bincount(edge_of_side, ascending, minlength=len(edges))
 
     used = np.zeros(n, bool)
     used[faces] = True
-    joined = coo_array((np.ones(len(sides), np.int8), (sides[:, 0], sides[:, 1])), shape=(n, n))
-    label = connected_components(joined, directed=False)[1]
     in_proper = np.zeros(n, bool)
     in_proper[simple] = True
-    parts = len(np.unique(label[in_proper]))
+    starts = np.concatenate([[0], np.cumsum(np.bincount(edges[:, 0], minlength=n))])
+    joined = csr_array((np.ones(len(edges), np.int8), edges[:, 1], starts), shape=(n, n))
+    parts = connected_components(joined, directed=False)[0] - int((~in_proper).sum())
 
-    fan_of_corner = _fans(simple, edge_of_side, side_count)
-    corner_vertex = simple.ravel()
-    pairs = np.unique(np.stack([corner_vertex, fan_of_corner], axis=1), axis=0)
-    fans = np.bincount(pairs[:, 0], minlength=n)
+    fan_of_corner = _fans(simple, edge_of_side, ascending)
+    vertex_of_fan = np.zeros(fan_of_corner.max(initial=-1) + 1, np.intp)
+    vertex_of_fan[fan_of_corner] = simple.ravel()
+    fans = np.bincount(vertex_of_fan, minlength=n)
 
     loops = _boundary_loops(simple, fan_of_corner, np.flatnonzero(side_count[edge_of_side] == 1))
     lengths = [float(np.linalg.norm(mesh.vertices[x] - mesh.vertices[np.roll(x, -1)], axis=1).sum()) for x in loops]
@@ -176,23 +177,18 @@ def require_disc(mesh: TriangleMesh) -> Topology:
     return found
 
 
-def _fans(faces: Integers, edge_of_side: Integers, side_count: Integers) -> Integers:
+def _fans(faces: Integers, edge_of_side: Integers, ascending: Booleans) -> Integers:
     """Label each corner, (3 m,), so that corners of one vertex agree if edges of two or more faces connect them."""
-    side_edge = edge_of_side.reshape(-1, 3)
-    corners = np.arange(faces.size).reshape(-1, 3)
-    ends: list[Integers] = []
-    for end in (1, 2):  # side k of a face runs from corner k + 1 to corner k + 2
-        corner = np.roll(corners, -end, axis=1)
-        # a node per (edge, vertex): every corner of that vertex beside that edge hangs on it
-        vertex = np.roll(faces, -end, axis=1)
-        other = np.roll(faces, -(3 - end), axis=1)
-        node = 2 * side_edge + (vertex < other)
-        ends.append(np.stack([corner.ravel(), node.ravel()], axis=1))
-    links = np.concatenate(ends)
-    links = links[side_count[links[:, 1] // 2] >= 2]
-    total = faces.size + 2 * len(side_count)
-    graph = coo_array((np.ones(len(links), np.int8), (links[:, 0], faces.size + links[:, 1])), shape=(total, total))
-    return connected_components(graph, directed=False)[1][: faces.size].astype(np.intp)
+    order = np.argsort(edge_of_side, kind="stable")
+    shared = edge_of_side[order[1:]] == edge_of_side[order[:-1]]
+    left, right = order[:-1][shared], order[1:][shared]
+    # side 3 f + k runs from corner k + 1 to corner k + 2
+    face, k = np.divmod(np.arange(faces.size), 3)
+    start, stop = 3 * face + (k + 1) % 3, 3 * face + (k + 2) % 3
+    low, high = np.where(ascending, start, stop), np.where(ascending, stop, start)
+    links = np.concatenate([low[left], high[left]]), np.concatenate([low[right], high[right]])
+    graph = coo_array((np.ones(len(links[0]), np.int8), links), shape=(faces.size, faces.size))
+    return connected_components(graph, directed=False)[1].astype(np.intp)
 
 
 def _boundary_loops(faces: Integers, fan_of_corner: Integers, boundary_sides: Integers) -> list[Integers]:
