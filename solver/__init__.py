@@ -5,22 +5,39 @@ In the order of the pipeline: a `TriangleMesh` is checked (`topology`), flattene
 values (`interpolate`).
 """
 
+from .align import Alignment, AlignSettings, Cancelled, Progress, align
+from .correspond import Correspondence, correspond
 from .flatten import Flattening, flatten
+from .interpolate import interpolate, interpolate_corners
+from .map_file import load_map, save_map
 from .mesh import MeshError, TriangleMesh
 from .mobius import Mobius
+from .report import report
 from .search import SearchProgress, SearchResult, search
 from .topology import Topology, require_disc, topology
 
 __all__ = [
+    "AlignSettings",
+    "Alignment",
+    "Cancelled",
+    "Correspondence",
     "Flattening",
     "MeshError",
     "Mobius",
+    "Progress",
     "SearchProgress",
     "SearchResult",
     "Topology",
     "TriangleMesh",
+    "align",
+    "correspond",
     "flatten",
+    "interpolate",
+    "interpolate_corners",
+    "load_map",
+    "report",
     "require_disc",
+    "save_map",
     "search",
     "topology",
 ]

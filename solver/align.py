@@ -1,0 +1,340 @@
+"""The pipeline: two meshes in, the best Möbius transformation between their discs out, with what is proved about it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from .descriptors import diffused_mean_curvature, standardised
+from .flatten import Flattening, flatten
+from .locate import TriangulatedDisc
+from .mesh import Complexes, Floats, Integers, TriangleMesh
+from .mobius import Mobius, hyperbolic_distance
+from .sampling import extrema, farthest_points
+from .search import SearchProgress, SearchResult, search
+
+
+class Cancelled(Exception):  # noqa: N818  (not an error: the user's own wish)
+    """The progress callback ended the work."""
+
+
+@dataclass(frozen=True)
+class AlignSettings:
+    """What `align` can be told; the defaults suit scans of one kind of object.
+
+    Attributes
+    ----------
+    samples : int
+        Source points of the search.
+    targets : int
+        Target points of the search; the match discs around them cover the target.
+    radius : float, optional
+        Hyperbolic radius of the match discs, in (0, 1). Default: each point's distance to its second nearest neighbour.
+    z_max : float
+        Bound on |z|, in (0, 1): how far the centres of the two discs may lie apart.
+    descriptor_scale : float
+        Standard deviation of the Gaussian that weighs differences of standardised descriptors.
+    smallest_weight : float
+        Pairs of a smaller weight are incompatible, in [0, 1).
+    reflect : str
+        "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly.
+    reflect_margin : float
+        Share of the samples by which a reflection has to win, and below which an orientation is called ambiguous.
+    time_limit : float, optional
+        Seconds for each search.
+    refine : str
+        "none": the search's transformation; "mobius": improved on all vertices.
+    """
+
+    samples: int = 100
+    targets: int = 1000
+    radius: float | None = None
+    z_max: float = 0.8337  # tanh(1.2)
+    descriptor_scale: float = 0.7
+    smallest_weight: float = 0.35
+    reflect: str = "auto"
+    reflect_margin: float = 0.06
+    time_limit: float | None = 60.0
+    refine: str = "mobius"
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius"))):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{getattr(self, name)}'")
+        if self.samples < 3 or self.targets < 3:
+            raise ValueError("samples and targets must be at least 3: a Möbius transformation has three parameters")
+        if not 0 < self.z_max < 1:
+            raise ValueError(f"z_max must lie between 0 and 1, not {self.z_max}")
+        if self.radius is not None and not 0 < self.radius < 1:
+            raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
+        if not (self.descriptor_scale > 0 and 0 <= self.smallest_weight < 1):
+            raise ValueError("descriptor_scale must be above 0 and smallest_weight in [0, 1)")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where `align` is: the stage, the share of the work done in [0, 1], and what the search has proved."""
+
+    stage: str
+    fraction: float
+    value: float | None = None
+    upper_bound: float | None = None
+    nodes: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Two flattened surfaces and the transformation between their discs.
+
+    Attributes
+    ----------
+    mobius : Mobius
+        Carries the source's disc to the target's.
+    search : SearchResult
+        The certified search that found it; `mobius` may be refined beyond `search.mobius`.
+    source, target : Flattening
+    source_samples, target_samples : (N1,), (N2,) int
+        Vertices that stood for the surfaces in the search; `search.matches` index into these.
+    source_descriptors, target_descriptors : (n, d) float64
+        Standardised descriptors of all vertices.
+    settings : AlignSettings
+    margin : float or None
+        By how much of the samples the chosen orientation beat the other; None if only one was searched.
+    seconds : dict of str to float
+        Wall-clock time per stage.
+    warnings : tuple of str
+        What the user should know, each a sentence.
+    """
+
+    mobius: Mobius
+    search: SearchResult
+    source: Flattening
+    target: Flattening
+    source_samples: Integers
+    target_samples: Integers
+    source_descriptors: Floats
+    target_descriptors: Floats
+    settings: AlignSettings
+    margin: float | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def align(
+    source_mesh: TriangleMesh,
+    target_mesh: TriangleMesh,
+    settings: AlignSettings | None = None,
+    progress: Callable[[Progress], bool | None] | None = None,
+) -> Alignment:
+    """Find the Möbius transformation between the discs of two surfaces, without landmarks.
+
+    Parameters
+    ----------
+    source_mesh, target_mesh : TriangleMesh
+        Triangulated discs in any pose, scale and triangulation.
+    settings : AlignSettings, optional
+    progress : callable, optional
+        Called with a `Progress` at each stage and a few times a second in the search; returns False to cancel.
+
+    Raises
+    ------
+    MeshError
+        A mesh is no disc.
+    Cancelled
+        The progress callback returned False.
+    """
+    settings = settings or AlignSettings()
+    clock = _Stages(progress)
+    clock.begin("flatten source", "Flattening the source", 0.0)
+    source = flatten(source_mesh)
+    clock.begin("flatten target", "Flattening the target", 0.08)
+    target = flatten(target_mesh)
+    clock.begin("descriptors", "Measuring curvature", 0.16)
+    source_descriptors = standardised(diffused_mean_curvature(source_mesh), source_mesh.vertex_areas)
+    target_descriptors = standardised(diffused_mean_curvature(target_mesh), target_mesh.vertex_areas)
+    clock.begin("sampling", "Choosing points", 0.25)
+    source_samples = _samples(source, source_descriptors, settings.samples)
+    target_samples = farthest_points(target_mesh, settings.targets, np.empty(0, np.intp), _interior(target))
+    found, margin, warnings = _searched(
+        source.disc[source_samples],
+        target.disc[target_samples],
+        compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings),
+        settings,
+        clock,
+    )
+    mobius = found.mobius
+    if settings.refine != "none":
+        clock.begin("refine", "Refining", 0.9)
+        mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings)
+    clock.end()
+    if not found.certified:
+        share = 100 * found.gap / max(found.upper_bound, 1e-300)
+        warnings.append(f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given")
+    return Alignment(
+        mobius=mobius,
+        search=found,
+        source=source,
+        target=target,
+        source_samples=source_samples,
+        target_samples=target_samples,
+        source_descriptors=source_descriptors,
+        target_descriptors=target_descriptors,
+        settings=settings,
+        margin=margin,
+        seconds=clock.seconds,
+        warnings=tuple(warnings),
+    )
+
+
+def compatibility(source: Floats, target: Floats, settings: AlignSettings) -> Floats:
+    """Return the weight, (N1, N2), of each pair of descriptors: a Gaussian of their difference, 0 if it is small."""
+    square = (source**2).sum(axis=1)[:, None] + (target**2).sum(axis=1) - 2 * source @ target.T
+    weights = np.exp(-np.maximum(square, 0) / (2 * settings.descriptor_scale**2))
+    return np.where(weights >= settings.smallest_weight, weights, 0.0)
+
+
+def covering_radius(points: Complexes) -> Floats:
+    """Return each point's pseudo-hyperbolic distance to its second nearest neighbour, (n,), at most 0.5.
+
+    Discs of these radii around evenly spread points cover the region between them.
+    """
+    distance = hyperbolic_distance(points[:, None], points)
+    return np.clip(np.sort(distance, axis=1)[:, min(2, len(points) - 1)], 1e-6, 0.5)
+
+
+def refined(
+    mobius: Mobius,
+    source: Flattening,
+    target: Flattening,
+    source_descriptors: Floats,
+    target_descriptors: Floats,
+    settings: AlignSettings,
+    most_vertices: int = 3000,
+) -> Mobius:
+    """Return the transformation near `mobius` at which the descriptors of all vertices agree best.
+
+    Maximises the area-weighted sum of exp(-|d_j - d(f(m_j))|^2 / (2 scale^2)), d on the target by linear interpolation,
+    over z and theta of a small transformation applied first (Nelder and Mead). Of larger meshes every so many-th vertex
+    is used.
+    """
+    used = np.flatnonzero(np.isfinite(source.disc.real))
+    used = used[:: max(1, len(used) // most_vertices)]
+    points, expected = source.disc[used], source_descriptors[used]
+    weights = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
+    disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
+
+    def disagreement(step: Floats) -> float:
+        if np.hypot(step[0], step[1]) >= 0.5:
+            return 0.0
+        face, barycentric = disc.locate((mobius @ _small(step))(points))
+        there = np.einsum("qk,qkd->qd", barycentric, target_descriptors[target.mesh.faces[face]])
+        square = ((there - expected) ** 2).sum(axis=1)
+        return -float(weights @ np.exp(-square / (2 * settings.descriptor_scale**2)))
+
+    corners = 0.03 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2]], dtype=float)
+    found = minimize(
+        disagreement,
+        np.zeros(3),
+        method="Nelder-Mead",
+        options={"initial_simplex": corners, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 200},
+    )
+    return mobius @ _small(found.x) if found.fun < disagreement(np.zeros(3)) else mobius
+
+
+def _small(step: Floats) -> Mobius:
+    """Return the transformation with z = step[0] + i step[1] and theta = step[2]."""
+    return Mobius(complex(step[0], step[1]), float(step[2]))
+
+
+def _interior(flattening: Flattening) -> np.ndarray:
+    """Return which vertices, (n,), are in use and inside the disc, where hyperbolic discs exist."""
+    inside = np.isfinite(flattening.disc.real) & (np.abs(flattening.disc) < 1 - 1e-9)
+    inside[flattening.boundary] = False
+    return inside
+
+
+def _samples(flattening: Flattening, descriptors: Floats, count: int) -> Integers:
+    """Return the source points: up to half of them extrema of curvature, the others far from these and each other."""
+    inside = _interior(flattening)
+    peaks = extrema(flattening.mesh, descriptors[:, 1], inside)[: count // 2]
+    return farthest_points(flattening.mesh, count, peaks, inside)
+
+
+def _searched(
+    source: Complexes, target: Complexes, weights: Floats, settings: AlignSettings, clock: _Stages
+) -> tuple[SearchResult, float | None, list[str]]:
+    """Search the orientations that the settings ask for; return the one to take, its margin, and warnings."""
+    radius = covering_radius(target) if settings.radius is None else settings.radius
+    results: dict[bool, SearchResult] = {}
+    sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
+    for position, reflected in enumerate(sides):
+        begin = 0.3 + 0.6 * position / len(sides)
+        clock.begin(
+            "search reflected" if reflected else "search",
+            "Searching the reflection" if reflected else "Searching",
+            begin,
+        )
+        result = search(
+            np.conj(source) if reflected else source,
+            target,
+            radius,
+            weights=weights,
+            z_max=settings.z_max,
+            time_limit=settings.time_limit,
+            progress=clock.searching(0.6 / len(sides)),
+        )
+        if result.cancelled:
+            raise Cancelled
+        results[reflected] = _mirrored(result) if reflected else result
+    if len(results) == 1:
+        return results[sides[0]], None, []
+    advantage = (results[True].value - results[False].value) / len(source)
+    chosen = advantage > settings.reflect_margin
+    warnings = []
+    if abs(advantage) <= settings.reflect_margin:
+        warnings.append(
+            f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
+            "taken as not mirrored"
+        )
+    return results[chosen], advantage if chosen else -advantage, warnings
+
+
+def _mirrored(result: SearchResult) -> SearchResult:
+    """Return the result of a search on the conjugated source as one on the source itself."""
+    return replace(result, mobius=Mobius(result.mobius.z, result.mobius.theta, True))
+
+
+class _Stages:
+    """Times the stages and passes them to the progress callback."""
+
+    def __init__(self, progress: Callable[[Progress], bool | None] | None) -> None:
+        self.progress = progress
+        self.seconds: dict[str, float] = {}
+        self._key, self._text, self._fraction, self._since = "", "", 0.0, 0.0
+
+    def begin(self, key: str, text: str, fraction: float) -> None:
+        self.end()
+        self._key, self._text, self._fraction, self._since = key, text, fraction, time.perf_counter()
+        if self.progress is not None and self.progress(Progress(text, fraction)) is False:
+            raise Cancelled
+
+    def end(self) -> None:
+        if self._key:
+            self.seconds[self._key] = time.perf_counter() - self._since
+        self._key = ""
+
+    def searching(self, share: float) -> Callable[[SearchProgress], bool | None] | None:
+        progress = self.progress
+        if progress is None:
+            return None
+
+        def report(state: SearchProgress) -> bool | None:
+            done = state.value / state.upper_bound if state.upper_bound > 0 else 1.0
+            fraction = self._fraction + share * min(max(done, 0.0), 1.0)
+            return progress(Progress(self._text, fraction, state.value, state.upper_bound, state.nodes))
+
+        return report
