@@ -1,0 +1,422 @@
+"""The commands without a window: `python . COMMAND` and, installed, `blender --command mobius COMMAND`.
+
+Blender is imported when a command runs, not before, so that help and wrong usage need nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import bpy
+
+    from ..solver import Alignment, AlignSettings, Correspondence
+    from .attributes import Transfer
+    from .mesh_data import Surface
+
+DONE, NOT_ALIGNED, UNUSABLE = 0, 1, 2
+"""Exit statuses: done; could not do it with these meshes; wrong usage or unreadable input."""
+
+
+class _Usage(Exception):  # noqa: N818  (carries argparse's own exit)
+    def __init__(self, status: int) -> None:
+        super().__init__(status)
+        self.status = status
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that does not end Blender."""
+
+    def exit(self, status: int = 0, message: str | None = None) -> Any:
+        if message:
+            say_error(message.rstrip())
+        raise _Usage(status)
+
+
+def say(text: str) -> None:
+    """Write a line of a command's result."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def say_error(text: str) -> None:
+    """Write a line about what went wrong."""
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
+
+
+def main(arguments: list[str], prog: str = "python .") -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : list of str
+        The command line after the program's name.
+    prog : str
+        What help calls the program.
+
+    Returns
+    -------
+    int
+        0 done; 1 could not be done with these meshes, the reason is on stderr; 2 wrong usage or unreadable input.
+    """
+    try:
+        options = _parser(prog).parse_args(arguments)
+    except _Usage as usage:
+        return usage.status
+
+    from ..solver import MeshError
+    from .files import Unreadable
+    from .mesh_data import Refusal
+
+    try:
+        return options.run(options)
+    except Unreadable as error:
+        say_error(f"mobius: {error}")
+        return UNUSABLE
+    except (MeshError, Refusal) as error:
+        say_error(f"mobius: {error}")
+        return NOT_ALIGNED
+    except KeyboardInterrupt:
+        say_error("mobius: stopped, nothing was written")
+        return NOT_ALIGNED
+
+
+def main_quietly(arguments: list[str], prog: str = "python .") -> int:
+    """Run one command with standard output and errors to itself: what Blender's importers say there goes nowhere."""
+    with _own_streams():
+        return main(arguments, prog)
+
+
+@contextmanager
+def _own_streams() -> Iterator[None]:
+    # Blender writes to the file descriptors, past Python; what it holds back in buffers comes out at exit, so they
+    # are not given back
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with (
+        os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace") as out,
+        os.fdopen(os.dup(2), "w", encoding="utf-8", errors="replace") as err,
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        os.close(nowhere)
+        yield
+
+
+def _parser(prog: str) -> argparse.ArgumentParser:
+    parser = _Parser(prog=prog, description="Certified conformal correspondence between two surfaces, and transfer.")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=_Parser)
+    mesh_help = "any file Blender imports (.blend .obj .ply .stl .glb .gltf .fbx .usd); FILE:OBJECT names an object"
+
+    def command(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=text)
+        added.set_defaults(run=run)
+        return added
+
+    demo = command("demo", _demo, "Build two scans, align and transfer, and leave pictures, a .blend and a report.")
+    demo.add_argument(
+        "-o", "--output", metavar="DIR", type=Path, default=Path("mobius-demo"), help="default: %(default)s"
+    )
+
+    check = command("check", _check, "Say what each mesh is, and what would make it a disc.")
+    check.add_argument("meshes", metavar="MESH", nargs="+", help=mesh_help)
+
+    flatten = command("flatten", _flatten, "Write a mesh with its map to the unit disc as UV map.")
+    flatten.add_argument("mesh", metavar="MESH", help=mesh_help)
+    flatten.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
+
+    align = command("align", _align, "Find the certified correspondence between two meshes.")
+    transfer = command("transfer", _transfer, "Carry what is on the source over to the target.")
+    for added in (align, transfer):
+        added.add_argument("source", metavar="SOURCE", help=mesh_help)
+        added.add_argument("target", metavar="TARGET", help=mesh_help)
+        added.add_argument("--map", metavar="MAP.npz", type=Path, help="write the correspondence, array by array")
+        added.add_argument("--report", metavar="REPORT.json", type=Path, help="write what was found and proved")
+        _add_align_options(added.add_argument_group("alignment"))
+    transfer.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
+    transfer.add_argument("--only", metavar="KIND,...", help="carry these only: vertex-groups, colors, uv, attributes")
+    transfer.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
+    return parser
+
+
+def _add_align_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--reflect", choices=("auto", "never", "always"), help="is one the mirror image of the other?")
+    group.add_argument("--refine", choices=("mobius", "none"), help="improve the proven map on all vertices, or not")
+    group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
+    group.add_argument("--targets", type=int, metavar="N", help="target points of the search")
+    group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")
+    group.add_argument("--z-max", type=float, metavar="Z", help="how far apart the discs' centres may lie, in (0, 1)")
+    group.add_argument("--time-limit", type=float, metavar="SECONDS", help="of each search; 0: none")
+
+
+def _align_settings(options: argparse.Namespace) -> AlignSettings:
+    """Return the solver's settings with the given options in place of its defaults."""
+    from ..solver import AlignSettings
+    from .files import Unreadable
+
+    names = ("reflect", "refine", "samples", "targets", "radius", "z_max", "time_limit")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    if "time_limit" in given:
+        given["time_limit"] = given["time_limit"] or None
+    try:
+        return AlignSettings(**given)
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from .demo import run
+
+    return run(options.output)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from ..solver import MeshError, topology
+    from .files import Unreadable, import_meshes, new_scene, split_object_name
+    from .mesh_data import read_surface
+
+    status = DONE
+    for argument in options.meshes:
+        path, wanted = split_object_name(argument)
+        new_scene()
+        try:
+            found = import_meshes(path)
+            chosen = [x for x in found if wanted in (None, x.name)]
+            if not chosen:
+                raise Unreadable(f"'{path}' has no mesh object named '{wanted}'")
+        except Unreadable as error:
+            say_error(f"mobius: {error}")
+            status = UNUSABLE
+            continue
+        for imported in chosen:
+            name = argument if len(chosen) == 1 else f"{path}:{imported.name}"
+            try:
+                what = topology(read_surface(imported.obj, name).mesh)
+                line, is_disc = what.describe(), what.is_disc
+            except MeshError as error:
+                line, is_disc = "not a disc: it " + str(error).removeprefix(f"'{name}' "), False
+            say(f"{name}: {line}")
+            if not is_disc:
+                status = max(status, NOT_ALIGNED)
+    return status
+
+
+def _flatten(options: argparse.Namespace) -> int:
+    from ..solver import flatten
+    from .attributes import DISC_LAYOUT
+    from .files import export_mesh, import_mesh, new_scene, outputs
+    from .mesh_data import read_surface
+    from .results import write_layout
+
+    _require_writable(meshes=[options.output])
+    new_scene()
+    obj = import_mesh(options.mesh)
+    surface = read_surface(obj, options.mesh)
+    flattening = flatten(surface.mesh)
+    write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+    with outputs() as written:
+        export_mesh(obj, written.path(options.output))
+    _warn_of_losses(options.output, ["uv"])
+    found = flattening.distortion
+    say(
+        f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
+        f"(median {found.median_angle_error:.2f}°, most {found.max_angle_error:.1f}°), "
+        f"{found.flips} triangles turned over"
+    )
+    return DONE
+
+
+def _align(options: argparse.Namespace) -> int:
+    from ..solver import report, save_map
+    from .files import new_scene, outputs
+
+    settings = _align_settings(options)
+    _require_writable(others=[options.map, options.report])
+    new_scene()
+    _, _, surfaces = _import_pair(options)
+    alignment, correspondence = _aligned(options, surfaces, settings)
+    with outputs() as written:
+        if options.map:
+            save_map(written.path(options.map), alignment, correspondence)
+        if options.report:
+            _write_report(written.path(options.report), report(alignment, correspondence))
+    return DONE
+
+
+def _transfer(options: argparse.Namespace) -> int:
+    from ..solver import load_map, report, save_map
+    from .attributes import Carrier, plan_transfer
+    from .files import Unreadable, export_mesh, new_scene, outputs
+    from .operators.transfer import describe_counts
+
+    kinds = _kinds(options.only)
+    settings = _align_settings(options)
+    if options.use_map and (options.map or options.report):
+        raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    _require_writable(meshes=[options.output], others=[options.map, options.report])
+    new_scene()
+    source, target, surfaces = _import_pair(options)
+    alignment = None
+    if options.use_map:
+        correspondence = _fitting_map(load_map, options, surfaces)
+    else:
+        alignment, correspondence = _aligned(options, surfaces, settings)
+    plan = plan_transfer(source, target, Carrier(correspondence, *surfaces), kinds)
+    plan.write(target)
+    with outputs() as written:
+        export_mesh(target, written.path(options.output))
+        if alignment and options.map:
+            save_map(written.path(options.map), alignment, correspondence)
+        if alignment and options.report:
+            figures = report(alignment, correspondence) | {"transferred": _listed(plan)}
+            _write_report(written.path(options.report), figures)
+    for warning in plan.warnings:
+        say_error(f"mobius: warning: {warning}")
+    _warn_of_losses(options.output, plan.counts())
+    say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}")
+    return DONE
+
+
+def _kinds(only: str | None) -> list[str]:
+    """Return the kinds of data that --only names; all of them without it."""
+    from .attributes import KINDS
+    from .files import Unreadable
+
+    known = [kind.identifier for kind in KINDS]
+    if only is None:
+        return known
+    wanted = [name.strip() for name in only.split(",") if name.strip()]
+    if unknown := [name for name in wanted if name not in known]:
+        raise Unreadable(f"--only does not know '{unknown[0]}': it takes {', '.join(known)}")
+    if not wanted:
+        raise Unreadable(f"--only names nothing: it takes {', '.join(known)}")
+    return wanted
+
+
+def _require_writable(meshes: Iterable[Path] = (), others: Iterable[Path | None] = ()) -> None:
+    """Raise `Unreadable` before any work if an output cannot be written."""
+    from .files import Unreadable, format_of
+
+    meshes, others = list(meshes), [path for path in others if path is not None]
+    for path in meshes:
+        format_of(path)
+    for path in [*meshes, *others]:
+        if path.is_dir():
+            raise Unreadable(f"'{path}' is a folder: name a file to write")
+        if not path.resolve().parent.is_dir():
+            raise Unreadable(f"there is no folder '{path.parent}' to write '{path.name}' in")
+    if len({path.resolve() for path in [*meshes, *others]}) < len(meshes) + len(others):
+        raise Unreadable("two outputs have the same name")
+
+
+def _import_pair(
+    options: argparse.Namespace,
+) -> tuple[bpy.types.Object, bpy.types.Object, tuple[Surface, Surface]]:
+    """Return the source object, the target object, and both as arrays."""
+    from .files import import_mesh
+    from .mesh_data import Refusal, read_surface
+
+    if _same_mesh(options.source, options.target):
+        raise Refusal(f"'{options.source}' is both source and target: give two meshes")
+    target = import_mesh(options.target)  # first, so that its materials and images keep their names
+    source = import_mesh(options.source)
+    return source, target, (read_surface(source, options.source), read_surface(target, options.target))
+
+
+def _same_mesh(source: str, target: str) -> bool:
+    from .files import split_object_name
+
+    (source_path, source_name), (target_path, target_name) = split_object_name(source), split_object_name(target)
+    return source_path.resolve() == target_path.resolve() and source_name == target_name
+
+
+def _aligned(
+    options: argparse.Namespace, surfaces: tuple[Surface, Surface], settings: AlignSettings
+) -> tuple[Alignment, Correspondence]:
+    """Align two surfaces and say what was found."""
+    from ..solver import align, correspond
+    from .operators.align import summary
+
+    source, target = surfaces
+    alignment = align(source.mesh, target.mesh, settings)
+    correspondence = correspond(alignment)
+    for warning in alignment.warnings:
+        say_error(f"mobius: warning: {warning}")
+    say(summary(options.source, options.target, alignment, correspondence))
+    say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
+    return alignment, correspondence
+
+
+def _fitting_map(
+    load_map: Callable[[Path], Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
+) -> Correspondence:
+    """Load a map and make sure that it is one between these two meshes."""
+    import numpy as np
+
+    from .files import Unreadable
+
+    path = options.use_map
+    if not path.is_file():
+        raise Unreadable(f"there is no file '{path}'")
+    try:
+        correspondence = load_map(path)
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise Unreadable(f"'{path}' is not a map that this program wrote") from error
+    source, target = surfaces
+    if not np.array_equal(correspondence.source_triangles, source.mesh.faces):
+        raise Unreadable(f"'{path}' was made for another source than '{options.source}'")
+    if len(correspondence.face) != len(target.mesh.vertices):
+        raise Unreadable(
+            f"'{path}' was made for a target of {len(correspondence.face):,} vertices, "
+            f"but '{options.target}' has {len(target.mesh.vertices):,}"
+        )
+    return correspondence
+
+
+def _listed(plan: Transfer) -> list[dict[str, str]]:
+    return [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]
+
+
+def _write_report(path: Path, figures: dict[str, Any]) -> None:
+    path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _warn_of_losses(path: Path, kinds: Iterable[str]) -> None:
+    """Say what a file of this kind cannot hold."""
+    from .files import format_of
+
+    lost = [kind for kind in kinds if kind not in format_of(path).keeps]
+    if lost:
+        say_error(f"mobius: warning: {path.suffix} files cannot hold {', '.join(lost)}: write a .blend to keep them")
+
+
+_handle: Any = None
+
+
+def register() -> None:
+    """Register the commands as `blender --command mobius`."""
+    import bpy
+
+    global _handle
+    _handle = bpy.utils.register_cli_command(
+        "mobius", lambda arguments: main_quietly(list(arguments), "blender --command mobius")
+    )
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    import bpy
+
+    bpy.utils.unregister_cli_command(_handle)

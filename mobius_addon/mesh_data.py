@@ -1,0 +1,97 @@
+"""Blender mesh objects as arrays: the triangles that Blender draws, and the way back to polygons and corners."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..solver import TriangleMesh
+from ..solver.mesh import Integers
+
+
+class Refusal(Exception):  # noqa: N818  (no error of the program)
+    """An operation cannot be done as asked; the text is a sentence for the person who asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh object as the solver sees it.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        Vertices in the object's own space and Blender's triangulation of the polygons. An object whose scale mirrors it
+        is mirrored here too (x negated, triangles turned round), so that left and right are what the person sees.
+    triangle_corners : (m, 3) int
+        Index of the face corner (Blender's loop) at each corner of each triangle.
+    triangle_polygon : (m,) int
+        Index of the polygon that each triangle is a piece of.
+    corner_vertex : (c,) int
+        Vertex of each face corner.
+    """
+
+    mesh: TriangleMesh
+    triangle_corners: Integers
+    triangle_polygon: Integers
+    corner_vertex: Integers
+
+    def fingerprint(self) -> str:
+        """Return a hash of vertices and triangles, which any edit of the shape changes."""
+        digest = hashlib.blake2b(digest_size=16)
+        digest.update(self.mesh.vertices.astype(np.float32).tobytes())
+        digest.update(self.mesh.faces.astype(np.int32).tobytes())
+        return digest.hexdigest()
+
+
+def foreach(collection: Any, name: str, width: int, dtype: type[np.generic]) -> np.ndarray:
+    """Return one property of a Blender collection as an array, (len, width), or (len,) where width is 1."""
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(name, values)
+    return values if width == 1 else values.reshape(-1, width)
+
+
+def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
+    """Return a mesh object as arrays.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        A mesh object, not in Edit Mode. Its own mesh is read, without modifiers.
+    name : str, optional
+        What error messages call it; the object's name by default.
+
+    Raises
+    ------
+    MeshError
+        No vertices, no faces, or a position that is not finite.
+    """
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    vertices = foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+    corner_vertex = foreach(mesh.loops, "vertex_index", 1, np.int32)
+    corners = foreach(mesh.loop_triangles, "loops", 3, np.int32)
+    polygons = foreach(mesh.loop_triangles, "polygon_index", 1, np.int32)
+    if is_mirrored(obj):
+        vertices[:, 0] *= -1
+        corners = corners[:, ::-1]
+    triangles = TriangleMesh(vertices, corner_vertex[corners], name or obj.name)
+    return Surface(triangles, corners.astype(np.intp), polygons.astype(np.intp), corner_vertex.astype(np.intp))
+
+
+def is_mirrored(obj: bpy.types.Object) -> bool:
+    """Return whether the object's transform turns left into right."""
+    return obj.matrix_world.to_3x3().determinant() < 0
+
+
+def scale_warning(obj: bpy.types.Object) -> str | None:
+    """Return a sentence if the object is stretched by a scale that its mesh does not have, else None."""
+    scale = np.abs(obj.matrix_world.to_scale())
+    if np.ptp(scale) > 1e-3 * scale.max():
+        return (
+            f"'{obj.name}' has different scales along its axes, which are ignored: apply the scale if it should count"
+        )
+    return None

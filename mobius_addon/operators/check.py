@@ -1,0 +1,104 @@
+"""Say what a mesh is, and select what keeps it from being a disc."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ...solver import MeshError, Topology, TriangleMesh, topology
+from ...solver.mesh import Booleans
+from .. import topology_cache
+from ..mesh_data import foreach, read_surface
+from ..usable import why_not
+
+
+class MOBIUS_OT_check(bpy.types.Operator):
+    """Say whether a mesh is a disc (one piece, one boundary), and select what is in the way."""
+
+    bl_idname = "mobius.check"
+    bl_label = "Check Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    object_name: bpy.props.StringProperty(
+        name="Object", description="Mesh object to check; the active object if empty", options={"SKIP_SAVE"}
+    )
+    select: bpy.props.BoolProperty(
+        name="Select Trouble", description="Select the vertices that are in the way, for Edit Mode", default=True
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Allow wherever objects can be looked at."""
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Switch to Object Mode first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Report one sentence."""
+        obj: Any = bpy.data.objects.get(self.object_name) if self.object_name else context.object
+        if self.object_name and obj is None:
+            self.report({"ERROR"}, f"there is no object '{self.object_name}'")
+            return {"CANCELLED"}
+        if reason := why_not(obj, "mesh", context.scene, writes=False):
+            self.report({"ERROR"}, reason)
+            return {"CANCELLED"}
+        try:
+            mesh = read_surface(obj).mesh
+        except MeshError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        found = topology(mesh)
+        topology_cache.store(obj, found)
+        line = f"'{obj.name}': {found.describe()}"
+        if found.is_disc:
+            self.report({"INFO"}, line)
+            return {"FINISHED"}
+        trouble = troubled_vertices(mesh, found)
+        if self.select and trouble.any() and obj.data.is_editable:
+            select_vertices(obj.data, trouble)
+            context.tool_settings.mesh_select_mode = (True, False, False)
+            line += f" ({int(trouble.sum()):,} vertices are selected: see them in Edit Mode)"
+        self.report({"WARNING"}, line)
+        return {"FINISHED"}
+
+
+def troubled_vertices(mesh: TriangleMesh, found: Topology) -> Booleans:
+    """Return which vertices, (n,), are part of what keeps the mesh from being a disc.
+
+    Of several parts or boundary loops the largest is taken as the one to keep.
+    """
+    trouble = np.zeros(len(mesh.vertices), bool)
+    trouble[mesh.faces[found.degenerate_faces]] = True
+    trouble[mesh.faces[found.duplicate_faces]] = True
+    for indices in (found.non_manifold_edges, found.inconsistent_edges, found.non_manifold_vertices):
+        trouble[indices] = True
+    if found.parts > 1:
+        trouble |= outside_largest_part(mesh)
+    elif not trouble.any():
+        for loop in found.boundary_loops[1:]:
+            trouble[loop] = True
+    return trouble
+
+
+def outside_largest_part(mesh: TriangleMesh) -> Booleans:
+    """Return which vertices, (n,), are in a face but not in the connected part of most vertices."""
+    n = len(mesh.vertices)
+    i, j = mesh.edges.T
+    label = connected_components(coo_array((np.ones(len(i), np.int8), (i, j)), shape=(n, n)), directed=False)[1]
+    used = np.zeros(n, bool)
+    used[mesh.faces] = True
+    return used & (label != np.argmax(np.bincount(label[used])))
+
+
+def select_vertices(mesh: bpy.types.Mesh, chosen: Booleans) -> None:
+    """Select exactly these vertices, (n,), and the edges and polygons that lie among them."""
+    mesh.vertices.foreach_set("select", chosen)
+    edges = foreach(mesh.edges, "vertices", 2, np.int32)
+    mesh.edges.foreach_set("select", chosen[edges].all(axis=1))
+    corners = foreach(mesh.loops, "vertex_index", 1, np.int32)
+    starts = foreach(mesh.polygons, "loop_start", 1, np.int32)
+    mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corners], starts))
+    mesh.update()

@@ -1,0 +1,84 @@
+"""What flatten and align write on a mesh for people to see: UV layouts, a color and the group of matched points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ..solver.mesh import Booleans, Complexes, Floats
+from .attributes import MAX_UV_MAPS, AttributeAccess, VertexGroupAccess
+from .mesh_data import Refusal, Surface
+
+_LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
+_COLOR = AttributeAccess("FLOAT_COLOR", "POINT", "color", 4)
+
+NO_COUNTERPART = (0.05, 0.05, 0.05, 1.0)
+"""Linear color of points that correspond to nothing."""
+
+
+def require_room(obj: bpy.types.Object, layouts: Sequence[str], colors: Sequence[str] = ()) -> None:
+    """Make sure that UV layouts and colors of these names can be written.
+
+    Raises
+    ------
+    Refusal
+        Another kind of attribute or a vertex group bears the name, or all UV maps that Blender allows are there.
+    """
+    for access, what, names in ((_LAYOUT, "UV map", layouts), (_COLOR, "color attribute", colors)):
+        for name in names:
+            if access.place(obj, name, frozenset()) != name:
+                raise Refusal(f"'{obj.name}' has something named '{name}' that is no {what}: rename it")
+    if len({x.name for x in obj.data.uv_layers} | set(layouts)) > MAX_UV_MAPS:
+        raise Refusal(f"'{obj.name}' has {MAX_UV_MAPS} UV maps, and Blender allows no more: delete one")
+
+
+def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Surface) -> None:
+    """Write points of the unit disc, (n,), as a UV map, uv = (disc + 1) / 2, and make it the active one.
+
+    Raises
+    ------
+    Refusal
+        As `require_room`; nothing is written.
+    """
+    require_room(obj, [name])
+    render = next((x.name for x in obj.data.uv_layers if x.active_render), None)
+    plane = np.stack([disc.real, disc.imag], axis=1) / 2 + 0.5
+    values = plane[surface.corner_vertex]
+    _LAYOUT.write(obj, name, values, np.ones(len(values), bool))
+    layers = obj.data.uv_layers
+    layers.active = layers[name]
+    if render is not None:  # what is rendered stays as it was
+        layers[render].active_render = True
+
+
+def disc_color(disc: Complexes) -> Floats:
+    """Return a linear color, (n, 4), for each point of the unit disc, (n,): grey in the middle, full hues at the rim.
+
+    Each channel is a linear function of position, so that interpolating colors interpolates positions.
+    """
+    hues = np.exp(2j * np.pi * np.arange(3) / 3)
+    channels = 0.5 + 0.5 * np.real(disc[:, None] * np.conj(hues))
+    return np.concatenate([channels, np.ones((len(disc), 1))], axis=1)
+
+
+def write_color(obj: bpy.types.Object, name: str, color: Floats, covered: Booleans) -> None:
+    """Write a linear color per vertex, (n, 4), `NO_COUNTERPART` where not covered, and make it the active one."""
+    attributes = obj.data.attributes
+    render = attributes.default_color_name
+    _COLOR.write(obj, name, np.where(covered[:, None], color, NO_COUNTERPART), np.ones(len(color), bool))
+    attributes.active_color_name = name
+    if render:
+        attributes.default_color_name = render
+
+
+def write_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
+    """Write weights, (n,), as a vertex group made anew, and leave the person's active group active."""
+    groups = obj.vertex_groups
+    active = groups.active.name if groups.active else None
+    if name in groups:
+        groups.remove(groups[name])
+    VertexGroupAccess().write(obj, name, weights, np.ones(len(weights), bool))
+    if active is not None and active in groups:
+        groups.active = groups[active]

@@ -1,0 +1,101 @@
+"""The result of an alignment, kept on the target's mesh: saved with it, undone with it, refused once it is stale."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..solver import Alignment, Correspondence, report
+from .mesh_data import Refusal, Surface
+
+
+def store(
+    target: bpy.types.Object,
+    source: bpy.types.Object,
+    alignment: Alignment,
+    correspondence: Correspondence,
+    surfaces: tuple[Surface, Surface],
+) -> None:
+    """Keep an alignment on the target's mesh.
+
+    Parameters
+    ----------
+    target, source : bpy.types.Object
+        The aligned objects.
+    alignment, correspondence : Alignment, Correspondence
+        The solver's results.
+    surfaces : (Surface, Surface)
+        Source and target as they were aligned.
+    """
+    packed = io.BytesIO()
+    np.savez(
+        packed,
+        face=correspondence.face.astype(np.int32),
+        barycentric=correspondence.barycentric,
+        matched=correspondence.matched,
+        confidence=correspondence.confidence.astype(np.float32),
+    )
+    kept = target.data.mobius_alignment
+    kept.source = source
+    kept.source_fingerprint, kept.target_fingerprint = (surface.fingerprint() for surface in surfaces)
+    kept.value = alignment.search.value
+    kept.upper_bound = alignment.search.upper_bound
+    kept.certified = alignment.search.certified
+    kept.reflected = alignment.mobius.reflected
+    figures = report(alignment, correspondence)
+    kept.coverage = figures["coverage"]
+    kept.seconds = sum(alignment.seconds.values())
+    kept.report = json.dumps(figures)
+    kept.packed = packed.getvalue()
+
+
+def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
+    """Return whether the target's mesh keeps an alignment with this source (stale or not)."""
+    kept = target.data.mobius_alignment
+    return bool(kept.target_fingerprint) and kept.source == source
+
+
+def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
+    """Return the sentence for a pair without an alignment."""
+    return f"'{target.name}' has not been aligned with '{source.name}' yet: press Align first"
+
+
+def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Surface, Surface]) -> Correspondence:
+    """Return the correspondence that the target's mesh keeps; `surfaces` are source and target as they are now.
+
+    Raises
+    ------
+    Refusal
+        There is none with this source, or one of the meshes has changed since.
+    """
+    if not exists(target, source):
+        raise Refusal(missing(target, source))
+    kept, (source_surface, target_surface) = target.data.mobius_alignment, surfaces
+    for obj, surface, fingerprint in (
+        (source, source_surface, kept.source_fingerprint),
+        (target, target_surface, kept.target_fingerprint),
+    ):
+        if surface.fingerprint() != fingerprint:
+            raise Refusal(f"'{obj.name}' has been edited since it was aligned: press Align again")
+    arrays = _unpack(kept.packed, target.name)
+    return Correspondence(
+        face=arrays["face"].astype(np.intp),
+        barycentric=arrays["barycentric"],
+        matched=arrays["matched"],
+        confidence=arrays["confidence"].astype(np.float64),
+        source_triangles=source_surface.mesh.faces,
+        source_size=len(source_surface.mesh.vertices),
+    )
+
+
+def _unpack(packed: bytes, name: str) -> dict[str, Any]:
+    try:
+        with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError, KeyError) as error:
+        raise Refusal(f"'{name}' keeps an alignment that is damaged: press Align again") from error

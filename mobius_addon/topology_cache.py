@@ -1,0 +1,88 @@
+"""What each mesh is, in one line for the panel, computed once per mesh and edit and not at every redraw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..solver import MeshError, Topology, topology
+from .mesh_data import read_surface
+
+MAX_POLYGONS = 200_000
+"""Larger meshes are checked when asked only, so that drawing the panel never takes noticeable time."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """What the panel says about a mesh.
+
+    Attributes
+    ----------
+    text : str
+        As `Topology.describe`, or why the mesh cannot be read.
+    is_disc : bool or None
+        None if it is not known yet.
+    """
+
+    text: str
+    is_disc: bool | None
+
+
+# a cache, never the truth: it can be emptied at any time
+_lines: dict[tuple[int, ...], Line] = {}
+
+
+def line_of(obj: bpy.types.Object) -> Line:
+    """Return the line about a mesh object in Object Mode."""
+    key = _key(obj)
+    if key not in _lines:
+        if len(obj.data.polygons) > MAX_POLYGONS:
+            return Line(f"{len(obj.data.vertices):,} vertices, not checked yet", None)
+        try:
+            store(obj, topology(read_surface(obj).mesh))
+        except MeshError as error:
+            _lines[key] = Line(str(error).removeprefix(f"'{obj.name}' "), False)
+    return _lines[key]
+
+
+def store(obj: bpy.types.Object, found: Topology) -> None:
+    """Keep what has been found about an object's mesh."""
+    _lines[_key(obj)] = Line(found.describe(), found.is_disc)
+
+
+def _key(obj: bpy.types.Object) -> tuple[int, ...]:
+    mesh = obj.data
+    return mesh.session_uid, len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons)
+
+
+@bpy.app.handlers.persistent
+def _forget_edited(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not _lines:
+        return
+    for update in depsgraph.updates:
+        if update.is_updated_geometry:
+            data = getattr(update.id.original, "data", update.id.original)
+            uid = getattr(data, "session_uid", None)
+            for key in [key for key in _lines if key[0] == uid]:
+                del _lines[key]
+
+
+@bpy.app.handlers.persistent
+def _forget_all(*_: object) -> None:
+    _lines.clear()
+
+
+def register() -> None:
+    """Watch for edits."""
+    bpy.app.handlers.depsgraph_update_post.append(_forget_edited)
+    for handlers in (bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.append(_forget_all)
+
+
+def unregister() -> None:
+    """Stop watching."""
+    bpy.app.handlers.depsgraph_update_post.remove(_forget_edited)
+    for handlers in (bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.remove(_forget_all)
+    _lines.clear()

@@ -1,0 +1,48 @@
+"""Whether an operator may work on an object, and if not, the sentence that says why and what to do."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, writes: bool = True) -> str | None:
+    """Return why an object cannot be used, or None if it can.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object or None
+        What was chosen.
+    role : str
+        What it was chosen as: "source mesh", "target mesh", "mesh".
+    scene : bpy.types.Scene
+        The scene that it has to be in.
+    writes : bool
+        Whether its data will be changed.
+    """
+    if obj is None:
+        return f"Choose a {role} first"
+    if obj.type != "MESH":
+        return f"'{obj.name}' is no mesh: convert it (Object > Convert > Mesh) or choose another {role}"
+    if scene.objects.get(obj.name) != obj:
+        return f"'{obj.name}' is not in this scene: choose another {role}"
+    if obj.mode != "OBJECT":
+        return f"'{obj.name}' is in {obj.mode.replace('_', ' ').title()} Mode: switch to Object Mode first"
+    if writes and not (obj.is_editable and obj.data.is_editable):
+        return f"'{obj.name}' is linked from another file: make it local first (Object > Relations > Make Local)"
+    return None
+
+
+def why_not_pair(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes_source: bool) -> str | None:
+    """Return why the chosen source and target cannot be used together, or None if they can."""
+    source, target = settings.source, settings.target
+    reason = why_not(source, "source mesh", scene, writes=writes_source) or why_not(target, "target mesh", scene)
+    if reason is not None:
+        return reason
+    if source == target:
+        return f"'{source.name}' is both source and target: choose two objects"
+    if source.data == target.data:
+        return (
+            f"'{source.name}' and '{target.name}' share one mesh: make one single-user first "
+            "(Object > Relations > Make Single User > Object & Data)"
+        )
+    return None
