@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+from scans import bumps
+from scipy.sparse.csgraph import dijkstra
+
+from solver import TriangleMesh
+from solver.sampling import edge_graph, extrema, farthest_points
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return bumps(400, seed=4)
+
+
+def test_extrema_are_above_or_below_all_neighbours(mesh):
+    values = np.random.default_rng(0).normal(size=len(mesh.vertices))
+    allowed = np.arange(len(values)) % 5 != 0
+    neighbours = [set() for _ in values]
+    for i, j in mesh.edges.tolist():
+        neighbours[i].add(j)
+        neighbours[j].add(i)
+    expected = {
+        v
+        for v, around in enumerate(neighbours)
+        if allowed[v] and (values[v] > max(values[list(around)]) or values[v] < min(values[list(around)]))
+    }
+    found = extrema(mesh, values, allowed)
+    assert set(found.tolist()) == expected
+    assert (np.diff(np.abs(values[found])) <= 0).all()
+
+
+def test_farthest_points_against_brute_force(mesh):
+    distance = dijkstra(edge_graph(mesh))
+    allowed = np.hypot(*mesh.vertices[:, :2].T) < 0.95
+    chosen = [7, 50]
+    while len(chosen) < 40:
+        to_chosen = np.where(allowed, distance[chosen].min(axis=0), -1)
+        chosen.append(int(np.argmax(to_chosen)))
+    assert farthest_points(mesh, 40, np.array([7, 50]), allowed).tolist() == chosen
+
+
+def test_the_first_is_the_deepest_inside(mesh):
+    allowed = np.hypot(*mesh.vertices[:, :2].T) < 0.95
+    depth = dijkstra(edge_graph(mesh))[~allowed].min(axis=0)
+    first = farthest_points(mesh, 1, np.empty(0, np.intp), allowed)
+    assert depth[first[0]] == depth.max()
+
+
+def test_no_more_than_there_are(mesh):
+    allowed = np.zeros(len(mesh.vertices), bool)
+    allowed[[3, 9, 11]] = True
+    found = farthest_points(mesh, 10, np.empty(0, np.intp), allowed)
+    assert sorted(found.tolist()) == [3, 9, 11]
+
+
+def test_edge_graph_holds_lengths():
+    triangle = TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    assert edge_graph(triangle).toarray().tolist() == [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
