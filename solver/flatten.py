@@ -10,12 +10,13 @@ import numpy as np
 from .circle import on_circle
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
+from .holes import filled
 from .injective import untangled
-from .intrinsic_delaunay import IntrinsicTriangulation
+from .intrinsic_delaunay import IntrinsicTriangulation, with_interior
 from .laplacian import mollified_lengths
-from .mesh import Complexes, Floats, Integers, TriangleMesh, edges_of_sides, twin_sides
+from .mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
 from .mobius import Mobius, conformal_barycentre
-from .topology import require_disc
+from .topology import Topology, require_disc
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +26,13 @@ class Flattening:
     Attributes
     ----------
     mesh : TriangleMesh
-        The surface.
+        The surface, without any filling.
     disc : (n,) complex128
         Image of each vertex, |disc| <= 1; nan at vertices in no face. Its area-weighted conformal barycentre is 0.
     boundary : (k,) int
-        The boundary's vertices in order; their images lie on the unit circle, counter-clockwise.
+        The outer boundary's vertices in order; their images lie on the unit circle, counter-clockwise.
+    holes : tuple of (k,) int arrays
+        Boundary loops that were closed for the computation; nothing is mapped to what they enclose.
     flips_repaired : int
         Triangles that were turned over in the conformal map and put right by moving the vertices around them.
     """
@@ -37,6 +40,7 @@ class Flattening:
     mesh: TriangleMesh
     disc: Complexes
     boundary: Integers
+    holes: tuple[Integers, ...] = ()
     flips_repaired: int = 0
 
     @cached_property
@@ -45,7 +49,13 @@ class Flattening:
         return distortion(self.mesh, self.disc)
 
 
-def flatten(mesh: TriangleMesh, method: str = "harmonic") -> Flattening:
+def flatten(
+    mesh: TriangleMesh,
+    method: str = "harmonic",
+    *,
+    fill_holes: bool = False,
+    outer_vertex: int | None = None,
+) -> Flattening:
     """Map a triangulated disc conformally to the unit disc.
 
     Parameters
@@ -54,6 +64,10 @@ def flatten(mesh: TriangleMesh, method: str = "harmonic") -> Flattening:
         A disc in the sense of `topology`; vertices in no face are allowed.
     method : str
         "harmonic": harmonic measure and harmonic extension.
+    fill_holes : bool
+        Allow openings: all boundary loops but the outer one are closed for the computation (`holes.filled`).
+    outer_vertex : int, optional
+        A vertex on the loop that is to be the outer one, for `fill_holes`; by default the longest loop is.
 
     Returns
     -------
@@ -64,34 +78,51 @@ def flatten(mesh: TriangleMesh, method: str = "harmonic") -> Flattening:
     Raises
     ------
     MeshError
-        The mesh is no disc.
+        The mesh is no disc, or `outer_vertex` is on none of its boundary loops.
     ValueError
         An unknown method.
     """
     if method != "harmonic":
         raise ValueError(f"unknown flattening method '{method}': use 'harmonic'")
-    boundary = require_disc(mesh).boundary_loops[0]
-    lengths = mollified_lengths(mesh.edge_lengths)
-    disc = riemann_map(_surface(mesh, lengths), boundary, mesh.vertex_areas)
+    boundary, holes = _outer_loop(mesh, require_disc(mesh, fill_holes=fill_holes), outer_vertex)
+    surface = _surface(mesh, holes)
+    disc = _centred(riemann_map(with_interior(surface), boundary)[: surface.vertex_count], mesh)
+    disc[boundary] = on_circle(disc[boundary])
 
-    used = np.unique(mesh.faces)
-    centring = Mobius(conformal_barycentre(disc[used], mesh.vertex_areas[used]), 0.0)
-    centred = np.full(len(disc), complex(np.nan, np.nan))
-    centred[used] = centring(disc[used])
-    centred[boundary] = on_circle(centred[boundary])
-    turned = int((signed_areas(centred, mesh.faces) <= 0).sum())
+    turned = _turned(disc, mesh)
     if turned:
-        centred = untangled(mesh.faces, lengths, centred, boundary)
-    return Flattening(mesh, centred, boundary, turned - int((signed_areas(centred, mesh.faces) <= 0).sum()))
+        disc = untangled(surface.faces, surface.lengths, disc, boundary)
+    result = np.full(len(mesh.vertices), complex(np.nan, np.nan))
+    used = np.unique(mesh.faces)
+    result[used] = disc[used]
+    return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh))
 
 
-def _surface(mesh: TriangleMesh, lengths: Floats) -> IntrinsicTriangulation:
-    """Return the disc as an intrinsic triangulation; a vertex in the middle of one that is a single triangle."""
-    n = len(mesh.vertices)
-    if len(mesh.faces) > 1:
-        return IntrinsicTriangulation(mesh.faces, lengths, twin_sides(mesh.edge_of_side), n)
-    (a, b, c), (la, lb, lc) = mesh.faces[0], lengths[0]
-    to = np.sqrt(2 * (lengths**2).sum() - 3 * lengths[0] ** 2) / 3
-    faces = np.array([[a, b, n], [b, c, n], [c, a, n]])
-    around = np.array([[to[1], to[0], lc], [to[2], to[1], la], [to[0], to[2], lb]])
-    return IntrinsicTriangulation(faces, around, twin_sides(edges_of_sides(faces, n + 1)[1]), n + 1)
+def _centred(disc: Complexes, mesh: TriangleMesh) -> Complexes:
+    """Return the disc moved so that the conformal barycentre of the mesh's vertices, by their area, is 0."""
+    used = np.unique(mesh.faces)
+    return Mobius(conformal_barycentre(disc[used], mesh.vertex_areas[used]), 0.0)(disc)
+
+
+def _turned(disc: Complexes, mesh: TriangleMesh) -> int:
+    """Return how many triangles of the mesh are turned over or collapsed in the disc."""
+    return int((signed_areas(disc, mesh.faces) <= 0).sum())
+
+
+def _surface(mesh: TriangleMesh, holes: tuple[Integers, ...]) -> IntrinsicTriangulation:
+    """Return the disc that a mesh is when its holes are closed; the mesh's faces and vertices come first."""
+    faces, lengths, count = filled(mesh, holes)
+    edge_of_side = edges_of_sides(faces, count)[1] if holes else mesh.edge_of_side
+    return IntrinsicTriangulation(faces, mollified_lengths(lengths), twin_sides(edge_of_side), count)
+
+
+def _outer_loop(mesh: TriangleMesh, found: Topology, vertex: int | None) -> tuple[Integers, tuple[Integers, ...]]:
+    """Return the outer boundary loop and the others."""
+    loops = found.boundary_loops
+    if vertex is None:
+        outer = int(np.argmax(found.loop_lengths))
+    else:
+        outer = next((k for k, loop in enumerate(loops) if vertex in loop), -1)
+        if outer < 0:
+            raise MeshError(f"'{mesh.name}' has vertex {vertex} on none of its boundary loops: choose one on the rim")
+    return loops[outer], loops[:outer] + loops[outer + 1 :]

@@ -21,8 +21,8 @@ from .laplacian import cotangents
 from .mesh import Complexes, Floats, Integers
 
 
-def riemann_map(surface: IntrinsicTriangulation, boundary: Integers, areas: Floats) -> Complexes:
-    """Return a conformal map of a disc to the unit disc, (n,); 0 at vertices in no face.
+def riemann_map(surface: IntrinsicTriangulation, boundary: Integers) -> Complexes:
+    """Return a conformal map of a disc to the unit disc, (n,) complex128; 0 at vertices in no face.
 
     Parameters
     ----------
@@ -30,18 +30,15 @@ def riemann_map(surface: IntrinsicTriangulation, boundary: Integers, areas: Floa
         A disc with an interior vertex; each triangle inequality holds strictly.
     boundary : (k,) int
         Its boundary's vertices in order, counter-clockwise.
-    areas : (n,) float64
-        Area around each vertex: the pole is the place deepest inside for a load of these.
     """
     count = surface.vertex_count
     surface = without_chords(surface, boundary)
     interior, inner, outer = _dirichlet_systems(surface, boundary)
     solve = factorised(inner)
 
-    load = np.zeros(surface.vertex_count)
-    load[:count] = areas
     pole = np.zeros(len(interior))
-    pole[np.argmax(solve(load[interior]))] = 1
+    # deepest inside: where a membrane under even load would give way most
+    pole[np.argmax(solve(surface.vertex_areas[interior]))] = 1
     flux = np.maximum(outer.T @ solve(pole), 0)
 
     disc = np.zeros(surface.vertex_count, np.complex128)

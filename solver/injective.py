@@ -32,13 +32,12 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
         return plane
     n = len(plane)
     sides = directed_edges(faces)
+    along = sides[:, 0], sides[:, 1]
     weight = np.maximum(cotangents(lengths).ravel(), 0)
-    weights = csr_array(coo_array((weight, (sides[:, 0], sides[:, 1])), shape=(n, n)))
-    weights = csr_array(weights + weights.T)
-    even = weights.copy()
-    even.data[:] = 1
     # an edge without weight could let its ends fall together
-    weights = csr_array(weights + 0.01 * weights.data.mean() * even)
+    weight = coo_array((weight + 0.01 * weight.mean(), along), shape=(n, n))
+    even = coo_array((np.ones(len(sides)), along), shape=(n, n))
+    weights, even = csr_array(weight + weight.T), csr_array(even + even.T)
 
     inside = np.zeros(n, bool)
     inside[faces] = True

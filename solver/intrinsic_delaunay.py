@@ -37,6 +37,13 @@ class IntrinsicTriangulation:
     vertex_count: int
 
     @property
+    def vertex_areas(self) -> Floats:
+        """A third of the faces around each vertex, (n,), in squared length units."""
+        _, height = _apex(*self.lengths.T)
+        third = np.repeat(self.lengths[:, 0] * height / 6, 3)
+        return np.bincount(self.faces.ravel(), third, self.vertex_count).astype(np.float64, copy=False)
+
+    @property
     def inner_sides(self) -> Integers:
         """One side of each edge that has two faces, (e,)."""
         return np.flatnonzero(np.arange(len(self.twins)) < self.twins)
@@ -89,6 +96,17 @@ def without_chords(
         first, second = chords // 3, triangulation.twins[chords] // 3
         triangulation = _cut(triangulation, chords[_independent(first, second, len(faces))])
     return triangulation
+
+
+def with_interior(triangulation: IntrinsicTriangulation) -> IntrinsicTriangulation:
+    """Return a disc of a single triangle with a vertex in its middle, any other disc as it is."""
+    if len(triangulation.faces) > 1:
+        return triangulation
+    n, (a, b, c), sides = triangulation.vertex_count, triangulation.faces[0], triangulation.lengths[0]
+    to_a, to_b, to_c = np.sqrt(2 * (sides**2).sum() - 3 * sides**2) / 3
+    faces = np.array([[a, b, n], [b, c, n], [c, a, n]])
+    lengths = np.array([[to_b, to_a, sides[2]], [to_c, to_b, sides[0]], [to_a, to_c, sides[1]]])
+    return IntrinsicTriangulation(faces, lengths, np.array([4, 6, -1, 7, 0, -1, 1, 3, -1]), n + 1)
 
 
 def _independent(first: Integers, second: Integers, face_count: int) -> Booleans:

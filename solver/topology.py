@@ -61,8 +61,11 @@ class Topology:
         """Whether the mesh is a triangulated disc: nothing in `problems`."""
         return not self.problems()
 
-    def problems(self) -> tuple[str, ...]:
-        """Return what keeps the mesh from being a disc, each as the rest of a sentence, with what to do about it."""
+    def problems(self, *, fill_holes: bool = False) -> tuple[str, ...]:
+        """Return what keeps the mesh from being a disc, each as the rest of a sentence, with what to do about it.
+
+        With `fill_holes` the disc may have openings: one boundary loop is its rim, the others will be closed.
+        """
         found: list[str] = []
         if n := len(self.degenerate_faces):
             found.append(f"has {plural(n, 'face')} with a vertex used twice: merge by distance or delete them")
@@ -81,7 +84,7 @@ class Topology:
         loops = len(self.boundary_loops)
         if loops == 0:
             found.append("is closed (it has no boundary): delete some faces to open it into a disc")
-        elif loops > 1:
+        elif loops > 1 and not fill_holes:
             edges = [f"{len(loop):,}" for loop in self.boundary_loops]
             listed = f"{', '.join(edges[:-1])} and {edges[-1]}" if loops <= 6 else f"{', '.join(edges[:5])}, ..."
             found.append(f"has {loops:,} boundary loops ({listed} edges): fill all but the outer one")
@@ -163,8 +166,8 @@ def topology(mesh: TriangleMesh) -> Topology:
     )
 
 
-def require_disc(mesh: TriangleMesh) -> Topology:
-    """Return the topology of a mesh that must be a disc.
+def require_disc(mesh: TriangleMesh, *, fill_holes: bool = False) -> Topology:
+    """Return the topology of a mesh that must be a disc or, with `fill_holes`, a disc with openings.
 
     Raises
     ------
@@ -172,7 +175,7 @@ def require_disc(mesh: TriangleMesh) -> Topology:
         It is none; the text names the mesh and everything that is in the way.
     """
     found = topology(mesh)
-    if problems := found.problems():
+    if problems := found.problems(fill_holes=fill_holes):
         raise MeshError(f"'{mesh.name}' " + "; it ".join(problems))
     return found
 
