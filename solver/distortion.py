@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .laplacian import cotangents
 from .mesh import Complexes, Floats, Integers, TriangleMesh
 
 
@@ -15,16 +16,29 @@ class Distortion:
 
     Attributes
     ----------
-    mean_angle_error, median_angle_error, max_angle_error : float
+    mean_angle_error, median_angle_error, percentile_99_angle_error, max_angle_error : float
         Over all corners, |angle in the plane - angle on the surface|, in degrees.
+    mean_dilatation, max_dilatation : float
+        Quasi-conformal dilatation, >= 1: the larger over the smaller stretch of a triangle; the mean is weighted by
+        area on the surface. Triangles turned over, and those without area on the surface, do not count.
+    min_log_factor, max_log_factor : float
+        Natural logarithm of the conformal factor at the vertices, relative to a map that keeps areas in proportion.
     flips : int
         Triangles turned over or collapsed in the plane.
+    circularity : float
+        4 pi area / perimeter^2 of the boundary's image: 1 for a circle, less for any other curve.
     """
 
     mean_angle_error: float
     median_angle_error: float
+    percentile_99_angle_error: float
     max_angle_error: float
+    mean_dilatation: float
+    max_dilatation: float
+    min_log_factor: float
+    max_log_factor: float
     flips: int
+    circularity: float
 
 
 def signed_areas(plane: Complexes, faces: Integers) -> Floats:
@@ -42,6 +56,36 @@ def corner_angles(corners: Floats) -> Floats:
     return np.where((dot == 0) & (cross == 0), np.pi / 3, np.arctan2(cross, dot))
 
 
+def angle_errors(mesh: TriangleMesh, plane: Complexes) -> Floats:
+    """Return |angle in the plane - angle on the surface| at each corner, (m, 3), in degrees."""
+    flat = np.stack([plane.real, plane.imag], axis=1)
+    return np.degrees(np.abs(corner_angles(flat[mesh.faces]) - corner_angles(mesh.vertices[mesh.faces])))
+
+
+def vertex_angle_errors(mesh: TriangleMesh, plane: Complexes) -> Floats:
+    """Return the mean angle error of the corners at each vertex, (n,), in degrees; nan where unused."""
+    n = len(mesh.vertices)
+    corners = np.bincount(mesh.faces.ravel(), minlength=n)
+    total = np.bincount(mesh.faces.ravel(), angle_errors(mesh, plane).ravel(), minlength=n)
+    return np.divide(total, corners, out=np.full(n, np.nan), where=corners > 0)
+
+
+def dilatations(mesh: TriangleMesh, plane: Complexes) -> Floats:
+    """Return the quasi-conformal dilatation of each triangle, (m,), the larger over the smaller stretch, >= 1.
+
+    Infinite where a triangle is turned over or collapsed, nan where it has no area on the surface.
+    """
+    corners = plane[mesh.faces]
+    squares = np.abs(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]) ** 2
+    # the integral of |grad f|^2 over a triangle: half the cotangents times the squared sides in the plane
+    energy = 0.5 * (cotangents(mesh.edge_lengths) * squares).sum(axis=1)
+    area = signed_areas(plane, mesh.faces)
+    ratio = np.divide(energy, 2 * area, out=np.full(len(area), np.inf), where=area > 0)
+    ratio = np.maximum(ratio, 1)
+    ratio[mesh.face_areas <= 1e-12 * mesh.edge_lengths.max(axis=1) ** 2] = np.nan
+    return ratio + np.sqrt((ratio - 1) * (ratio + 1))
+
+
 def log_conformal_factor(mesh: TriangleMesh, plane: Complexes) -> Floats:
     """Return half the log of area in the plane over area on the surface around each vertex, (n,); nan where unused."""
     flat = np.abs(signed_areas(plane, mesh.faces))
@@ -52,13 +96,37 @@ def log_conformal_factor(mesh: TriangleMesh, plane: Complexes) -> Floats:
     return factor
 
 
-def distortion(mesh: TriangleMesh, plane: Complexes) -> Distortion:
-    """Return the distortion of the map of `mesh` to the points `plane`, (n,) complex128."""
-    flat = np.stack([plane.real, plane.imag], axis=1)
-    error = np.degrees(np.abs(corner_angles(flat[mesh.faces]) - corner_angles(mesh.vertices[mesh.faces])))
+def distortion(mesh: TriangleMesh, plane: Complexes, boundary: Integers) -> Distortion:
+    """Return the distortion of a map of `mesh` to the plane.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    plane : (n,) complex128
+        Image of each vertex in use.
+    boundary : (k,) int
+        Vertices of the outer boundary in order.
+    """
+    error = angle_errors(mesh, plane)
+    dilatation = dilatations(mesh, plane)
+    counted = np.isfinite(dilatation)
+    weight = mesh.face_areas[counted]
+    factor = log_conformal_factor(mesh, plane)
+    covered = np.abs(signed_areas(plane, mesh.faces)).sum()
+    factor = factor[np.isfinite(factor)] - 0.5 * np.log(max(covered, np.finfo(float).tiny) / mesh.area)
+    rim = plane[boundary]
+    perimeter = np.abs(np.roll(rim, -1) - rim).sum()
+    median, percentile_99 = np.percentile(error, [50, 99])
     return Distortion(
         mean_angle_error=float(error.mean()),
-        median_angle_error=float(np.median(error)),
+        median_angle_error=float(median),
+        percentile_99_angle_error=float(percentile_99),
         max_angle_error=float(error.max()),
+        mean_dilatation=float((dilatation[counted] * weight).sum() / weight.sum()) if counted.any() else 1.0,
+        max_dilatation=float(dilatation[counted].max(initial=1.0)),
+        min_log_factor=float(factor.min()),
+        max_log_factor=float(factor.max()),
         flips=int((signed_areas(plane, mesh.faces) <= 0).sum()),
+        circularity=float(2 * np.pi * np.imag(np.conj(rim) * np.roll(rim, -1)).sum() / perimeter**2),
     )

@@ -46,7 +46,7 @@ class Flattening:
     @cached_property
     def distortion(self) -> Distortion:
         """How far the map is from conformal."""
-        return distortion(self.mesh, self.disc)
+        return distortion(self.mesh, self.disc, self.boundary)
 
 
 def flatten(
