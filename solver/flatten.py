@@ -12,11 +12,15 @@ from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
 from .holes import filled
 from .injective import untangled
-from .intrinsic_delaunay import IntrinsicTriangulation, with_interior
+from .intrinsic_delaunay import IntrinsicTriangulation
 from .laplacian import mollified_lengths
 from .mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
+from .mid_edge import mid_edge_map
 from .mobius import Mobius, conformal_barycentre
 from .topology import Topology, require_disc
+
+METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map}
+"""Each takes an intrinsic triangulation and its boundary, and returns the disc."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +67,8 @@ def flatten(
     mesh : TriangleMesh
         A disc in the sense of `topology`; vertices in no face are allowed.
     method : str
-        "harmonic": harmonic measure and harmonic extension.
+        "harmonic": harmonic measure and harmonic extension on intrinsic Delaunay weights (`harmonic.riemann_map`).
+        "mid-edge": conjugate harmonic functions at the edges' midpoints (`mid_edge.mid_edge_map`).
     fill_holes : bool
         Allow openings: all boundary loops but the outer one are closed for the computation (`holes.filled`).
     outer_vertex : int, optional
@@ -78,15 +83,19 @@ def flatten(
     Raises
     ------
     MeshError
-        The mesh is no disc, or `outer_vertex` is on none of its boundary loops.
+        The mesh is no disc, `outer_vertex` is on none of its boundary loops, or the mesh is too coarse for the method.
     ValueError
         An unknown method.
     """
-    if method != "harmonic":
-        raise ValueError(f"unknown flattening method '{method}': use 'harmonic'")
+    if method not in METHODS:
+        raise ValueError(f"unknown flattening method '{method}': use one of {', '.join(METHODS)}")
     boundary, holes = _outer_loop(mesh, require_disc(mesh, fill_holes=fill_holes), outer_vertex)
     surface = _surface(mesh, holes)
-    disc = _centred(riemann_map(with_interior(surface), boundary)[: surface.vertex_count], mesh)
+    try:
+        disc = METHODS[method](surface, boundary)
+    except ValueError as reason:
+        raise MeshError(f"'{mesh.name}' is too coarse for the method '{method}': {reason}") from reason
+    disc = _centred(disc, mesh)
     disc[boundary] = on_circle(disc[boundary])
 
     turned = _turned(disc, mesh)

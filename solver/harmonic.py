@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from .circle import angles_of_arcs
-from .intrinsic_delaunay import IntrinsicTriangulation, without_chords
+from .intrinsic_delaunay import IntrinsicTriangulation, with_interior, without_chords
 from .laplacian import cotangents
 from .mesh import Complexes, Floats, Integers
 
@@ -27,12 +27,12 @@ def riemann_map(surface: IntrinsicTriangulation, boundary: Integers) -> Complexe
     Parameters
     ----------
     surface : IntrinsicTriangulation
-        A disc with an interior vertex; each triangle inequality holds strictly.
+        A disc; each triangle inequality holds strictly.
     boundary : (k,) int
         Its boundary's vertices in order, counter-clockwise.
     """
     count = surface.vertex_count
-    surface = without_chords(surface, boundary)
+    surface = without_chords(with_interior(surface), boundary)
     interior, inner, outer = _dirichlet_systems(surface, boundary)
     solve = factorised(inner)
 
