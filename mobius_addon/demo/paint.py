@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..mesh_data import foreach
 from ...solver.mesh import Floats
+from ..mesh_data import foreach
 from .scans import read_vertices
 
 FACE_PAINT = "Face paint"
@@ -46,6 +46,7 @@ def paint(source: bpy.types.Object) -> None:
             group.add([int(index)], float(values[index]), "REPLACE")
     source.shape_key_add(name="Basis", from_mix=False)
     smiling = source.shape_key_add(name=SMILE, from_mix=False)
+    smiling.value = 0.0  # Blender 5.2 gives new shape keys the value 1
     smiling.points.foreach_set("co", smile(vertices).astype(np.float32).ravel())
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import addon_utils
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 from scipy.spatial.transform import Rotation
 
 from ...solver.mesh import Complexes, Floats, Integers
+from ..mesh_data import Refusal
 from .scans import read_vertices, write_vertices
 
 PIXELS_ACROSS = 1400
@@ -62,6 +62,8 @@ class Disc:
         Where each of its vertices lies in the unit disc.
     points : (p,) complex
         The matched points.
+    point_colors : (p, 3) float64
+        Linear RGB of each.
     caption : str
         What stands below it.
     """
@@ -70,10 +72,11 @@ class Disc:
     material: bpy.types.Material
     disc: Complexes
     points: Complexes
+    point_colors: Floats
     caption: str
 
 
-def render_heads(sitters: Sequence[Sitter], path: Path, *, samples: int = 24) -> None:
+def render_heads(sitters: Sequence[Sitter], path: Path, *, samples: int = 16) -> None:
     """Render the heads side by side into a PNG file at `path`."""
     width, height = 2.9, 2.8
     with studio(width * len(sitters), height, samples) as scene:
@@ -88,7 +91,7 @@ def render_heads(sitters: Sequence[Sitter], path: Path, *, samples: int = 24) ->
         render(scene, path)
 
 
-def render_discs(discs: Sequence[Disc], path: Path, *, samples: int = 12) -> None:
+def render_discs(discs: Sequence[Disc], path: Path, *, samples: int = 8) -> None:
     """Render the discs side by side, with the matched points on them, into a PNG file at `path`."""
     spacing, height = 2.3, 2.45
     with studio(spacing * len(discs), height, samples) as scene:
@@ -101,10 +104,9 @@ def render_discs(discs: Sequence[Disc], path: Path, *, samples: int = 12) -> Non
             surface = put(scene, disc.mesh.copy(), disc.material, Matrix.Translation(layers[0]))
             surface.shape_key_clear()
             write_vertices(surface.data, upright(disc.disc))
-            put(scene, rings(np.zeros(1), 0.995, 1.005), ink, Matrix.Translation(layers[1]))
-            colors = hues(disc.points)
+            put(scene, rings(np.zeros(1, complex), 0.995, 1.005), ink, Matrix.Translation(layers[1]))
             put(scene, rings(disc.points, 0.0, 0.015), ink, Matrix.Translation(layers[2]))
-            put(scene, rings(disc.points, 0.0, 0.010, colors), dot_color, Matrix.Translation(layers[3]))
+            put(scene, rings(disc.points, 0.0, 0.010, disc.point_colors), dot_color, Matrix.Translation(layers[3]))
             write(scene, disc.caption, (layers[0].x, -height / 2 + 0.08))
         render(scene, path)
 
@@ -127,6 +129,7 @@ def studio(width: float, height: float, samples: int) -> Iterator[bpy.types.Scen
         scene.render.resolution_y = round(PIXELS_ACROSS * height / width)
         scene.render.image_settings.file_format = "PNG"
         scene.render.image_settings.color_mode = "RGB"
+        scene.render.dither_intensity = 0.0
         scene.view_settings.view_transform = "Standard"
         scene.world = paper_world()
         camera = bpy.data.objects.new("Studio camera", bpy.data.cameras.new("Studio camera"))
@@ -150,26 +153,33 @@ def made_here() -> tuple[Any, ...]:
     return (data.objects, data.meshes, data.curves, data.cameras, data.lights, data.worlds, data.materials)
 
 
+def require_cycles() -> None:
+    """Make sure that the renderer is there, for this session only where a person has switched it off.
+
+    Raises
+    ------
+    Refusal
+        This Blender is built without it.
+    """
+    if not addon_utils.check("cycles")[1] and addon_utils.enable("cycles") is None:
+        raise Refusal("the pictures need the renderer Cycles, which this Blender does not have: use another build")
+
+
 def render(scene: bpy.types.Scene, path: Path) -> None:
-    """Render `scene` into the PNG file `path`."""
+    """Render `scene` into the PNG file `path`.
+
+    Raises
+    ------
+    Refusal
+        The file could not be written.
+    """
     scene.render.filepath = str(path)
-    with quiet():
-        bpy.ops.render.render(scene=scene.name, write_still=True)
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Keep Cycles' progress, which comes from outside Python, off the standard output."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    silence = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(silence, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(silence)
-        os.close(kept)
+        bpy.ops.render.render(scene=scene.name, write_still=True)
+    except RuntimeError as error:
+        raise Refusal(f"'{path.name}' could not be rendered: {error}") from error
+    if not path.is_file():
+        raise Refusal(f"'{path.name}' could not be written")
 
 
 def fit(mesh: bpy.types.Mesh, turn: Rotation, frame: Floats) -> Matrix:
@@ -297,8 +307,9 @@ def fresh_tree(owner: bpy.types.Material | bpy.types.World) -> tuple[bpy.types.N
     """Return the emptied nodes of a new material or world."""
     if owner.node_tree is None:  # from Blender 5.0 on they are born with one
         owner.use_nodes = True
-    owner.node_tree.nodes.clear()
-    return owner.node_tree.nodes, owner.node_tree.links
+    tree: Any = owner.node_tree
+    tree.nodes.clear()
+    return tree.nodes, tree.links
 
 
 def darken(

@@ -1,8 +1,8 @@
 """Two scans of Blender's own monkey head, and the exact correspondence between them.
 
 The source is the head cut open at the back, a disc of quads. The target is the same head remeshed by voxels, thinned,
-cut a little further in, laid onto the source's surface (which is where the ground truth comes from), then bent, swollen,
-scaled, turned and moved.
+cut a little further in, laid onto the source's surface (which is where the ground truth comes from), then swollen,
+bent, scaled, turned and moved.
 """
 
 from __future__ import annotations
@@ -13,23 +13,22 @@ from dataclasses import dataclass
 import bmesh
 import bpy
 import numpy as np
-import numpy.typing as npt
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from scipy.spatial.transform import Rotation
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.intp]
+from ...solver.mesh import Floats, Integers
+from ..mesh_data import foreach
 
 SUBDIVISIONS = 2
 VOXEL = 0.03
 TARGET_VERTICES = 8000
-# The opening is a plane behind the ears, tilted so that the underside goes with the back, and hollowed towards the middle
-# so that it passes between the ears. The target ends a little earlier, as a second scan of the same head would.
+# The opening is a plane behind the ears, tilted so that the underside goes with the back, and hollowed in the middle to
+# pass between the ears. The target ends a little earlier, as a second scan of the same head would.
 OPENING_NORMAL = Vector((0.0, 0.954, -0.3))
 OPENING_HOLLOW = 0.2
-SOURCE_OPENING = 0.24
-TARGET_OPENING = 0.22
+SOURCE_OPENING = 0.27
+TARGET_OPENING = 0.265
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,7 @@ class Similarity:
     offset: tuple[float, float, float]
 
     def __call__(self, points: Floats) -> Floats:
+        """Return the moved points, (n, 3)."""
         return self.scale * self.rotation.apply(points) + np.asarray(self.offset)
 
 
@@ -93,10 +93,11 @@ def build_scans() -> Scans:
 
 
 def deform(points: Floats) -> Floats:
-    """Bend and swell the head, (n, 3) to (n, 3): smooth, nearly without stretch, and like no rigid motion."""
-    points = swell(points, centre=(0.0, 0.0, 0.6), amount=0.2, width=0.6)
-    points = bend(points, along=0, towards=1, curvature=-0.4, neutral=0.1)
-    return bend(points, along=2, towards=0, curvature=0.4, neutral=0.0)
+    """Swell and bend the head, (n, 3) to (n, 3): smooth, nearly without stretch, and like no rigid motion."""
+    points = swell(points, centre=(0.0, 0.0, 0.6), amount=0.1, width=0.6)
+    for bend in BENDS:
+        points = bend(points)
+    return points
 
 
 def swell(points: Floats, centre: tuple[float, float, float], amount: float, width: float) -> Floats:
@@ -106,14 +107,52 @@ def swell(points: Floats, centre: tuple[float, float, float], amount: float, wid
     return points + amount * np.exp(-squared / (2 * width**2))[:, None] * from_centre
 
 
-def bend(points: Floats, *, along: int, towards: int, curvature: float, neutral: float) -> Floats:
-    """Curl the axis `along` into an arc towards the axis `towards`; nothing stretches where that one is `neutral`."""
-    turn = curvature * points[:, along]
-    radius = 1 / curvature - (points[:, towards] - neutral)
-    bent = points.copy()
-    bent[:, along] = radius * np.sin(turn)
-    bent[:, towards] = neutral + 1 / curvature - radius * np.cos(turn)
-    return bent
+@dataclass(frozen=True)
+class Bend:
+    """Curl the stretch of an axis from `start` to `end` into an arc; what lies beyond goes along, straight.
+
+    Parameters
+    ----------
+    along, towards : int
+        The axis that curls (0 to 2), and the one that it curls towards.
+    start, end : float
+        Where on the axis the arc begins and ends; `end` may be the smaller.
+    angle : float
+        How far it turns, in radians.
+    neutral : float
+        Where on the other axis lengths are kept.
+    """
+
+    along: int
+    towards: int
+    start: float
+    end: float
+    angle: float
+    neutral: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """Return the bent points, (n, 3)."""
+        way = np.sign(self.end - self.start)
+        curvature = self.angle / abs(self.end - self.start)
+        length = way * (points[:, self.along] - self.start)
+        arc = np.clip(length, 0, abs(self.end - self.start))
+        beyond, off = length - arc, points[:, self.towards] - self.neutral
+        sine, cosine = np.sin(curvature * arc), np.cos(curvature * arc)
+        bent = points.copy()
+        bent[:, self.along] = self.start + way * (sine / curvature + beyond * cosine - off * sine)
+        bent[:, self.towards] = self.neutral + (1 - cosine) / curvature + beyond * sine + off * cosine
+        return bent
+
+
+# How the second scan differs: an ear turned forwards, the other laid back, the jaw down and to a side, the head curved.
+BENDS = (
+    Bend(along=0, towards=1, start=0.82, end=1.12, angle=-0.6, neutral=0.4),
+    Bend(along=0, towards=1, start=-0.82, end=-1.12, angle=0.6, neutral=0.4),
+    Bend(along=2, towards=0, start=-0.3, end=-0.8, angle=0.15, neutral=0.0),
+    Bend(along=2, towards=1, start=-0.3, end=-0.8, angle=0.5, neutral=-0.5),
+    Bend(along=2, towards=0, start=0.0, end=1.2, angle=0.3, neutral=0.0),
+    Bend(along=2, towards=0, start=0.0, end=-1.2, angle=0.3, neutral=0.0),
+)
 
 
 def closed_head() -> bpy.types.Mesh:
@@ -214,8 +253,8 @@ def cut_open(mesh: bpy.types.Mesh, distance: float, name: str) -> bpy.types.Mesh
 def lay_onto(mesh: bpy.types.Mesh, surface: bpy.types.Mesh) -> GroundTruth:
     """Find for each vertex of `mesh` the nearest point of `surface`; nothing is moved."""
     vertices = read_vertices(surface)
-    triangles = np.empty((len(surface.loop_triangles), 3), dtype=np.int32)
-    surface.loop_triangles.foreach_get("vertices", triangles.ravel())
+    surface.calc_loop_triangles()
+    triangles = foreach(surface.loop_triangles, "vertices", 3, np.int32)
     tree = BVHTree.FromPolygons(vertices.tolist(), triangles.tolist(), all_triangles=True)
     nearest = [tree.find_nearest(vertex.co) for vertex in mesh.vertices]
     points = np.array([point for point, _, _, _ in nearest])
@@ -247,9 +286,7 @@ def to_mesh(shape: bmesh.types.BMesh, name: str) -> bpy.types.Mesh:
 
 def read_vertices(mesh: bpy.types.Mesh) -> Floats:
     """Return the vertex positions, (n, 3), in the mesh's own coordinates."""
-    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", flat)
-    return flat.reshape(-1, 3).astype(np.float64)
+    return foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
 
 
 def write_vertices(mesh: bpy.types.Mesh, positions: Floats) -> None:
