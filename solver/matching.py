@@ -6,16 +6,13 @@ The paper's objective is w = 1 with Euclidean discs of one radius; hyperbolic di
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from .mesh import Complexes, Floats, Integers
 from .mobius import Mobius, hyperbolic_disc
-
-WEIGHT_UNIT = 2.0**-24
-"""Weights are rounded to multiples of this, so that every sum of them is exact in float64 and in any order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +30,10 @@ class Matching:
     radius : (P,) float64
         Its Euclidean radius, > 0.
     weight : (P,) float64
-        In (0, 1], a multiple of `WEIGHT_UNIT`.
+        In (0, 1], a multiple of `unit`.
+    unit : float
+        1 if all weights are 1, else a power of 2 so small that a weight is rounded by 2^-20 or less for up to 2,047
+        points, and so large that N1 / unit < 2^31: every sum of weights is exact, in any order, in 32 bits too.
     """
 
     source: Complexes
@@ -42,6 +42,7 @@ class Matching:
     centre: Complexes
     radius: Floats
     weight: Floats
+    unit: float = 1.0
 
     @property
     def limit(self) -> float:
@@ -52,7 +53,7 @@ class Matching:
 
     def reflected(self) -> Matching:
         """Return the matching of the conjugated source."""
-        return Matching(np.conj(self.source), self.point, self.target, self.centre, self.radius, self.weight)
+        return replace(self, source=np.conj(self.source))
 
     def hits(self, mobius: Mobius) -> Integers:
         """Return the pairs, as indices into `point` and `target`, whose disc the transformed source point lies in."""
@@ -113,17 +114,18 @@ def matching(
         raise ValueError(f"unknown metric '{metric}': use 'hyperbolic' or 'euclidean'")
     if weights is None:
         j, k = (x.ravel() for x in np.indices((len(m), len(b))))
-        w = np.ones(len(j))
+        w, unit = np.ones(len(j)), 1.0
     else:
         table = np.asarray(weights, dtype=np.float64)
         if table.shape != (len(m), len(b)):
             raise ValueError(f"weights must be of shape {(len(m), len(b))}, not {table.shape}")
         if not (np.isfinite(table).all() and (table >= 0).all() and (table <= 1).all()):
             raise ValueError("every weight must lie in [0, 1]")
-        table = np.round(table / WEIGHT_UNIT) * WEIGHT_UNIT
+        unit = 1.0 if np.isin(table, (0, 1)).all() else 2.0 ** (len(m).bit_length() - 31)
+        table = np.round(table / unit) * unit
         j, k = np.nonzero(table)
         w = table[j, k]
-    return Matching(m, j.astype(np.intp), k.astype(np.intp), centre[k], e[k], w)
+    return Matching(m, j.astype(np.intp), k.astype(np.intp), centre[k], e[k], w, unit)
 
 
 def _disc_points(points: npt.ArrayLike, role: str) -> Complexes:

@@ -6,24 +6,32 @@ can hold a better value than the one in hand.
 
 from __future__ import annotations
 
-import heapq
+import os
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
 
-from .bounds import enclosing_arcs, exact_arcs
+from .kernels import kernels_for
+from .kernels.nodes import BOUND, HALF, X, Y, whole_disc
 from .matching import Matching, matching
 from .mesh import Complexes, Floats, Integers
 from .mobius import Mobius
-from .stabbing import stab
 
 CELLS_AT_ONCE = 64
-"""Cells split in one round: enough to keep numpy busy, few enough to stay close to best-first order."""
+"""Open cells taken on in one round, the best bounds first. The threads share them, so that what a round finds does not
+depend on how many threads there are."""
 
-SMALLEST_CELL = 2.0**-40
+FRONTIER = 1 << 18
+"""Open cells, 64 bytes each, beyond which the smallest are searched first: then the search is depth first, and adds
+few more."""
+
+SMALLEST_CELL = 2.0**-38
 """Half side of a cell that is not split further; what its bound leaves open is reported as a gap."""
 
 
@@ -59,6 +67,10 @@ class SearchResult:
         A (source point, target point) pair for each matched source point.
     cancelled : bool
         Whether the progress callback ended the search.
+    one_to_one : float
+        The greatest weight of pairs within reach under `mobius` that share neither source nor target point.
+    kernels : str
+        What computed the bounds: "compiled" or "numpy".
     """
 
     mobius: Mobius
@@ -69,6 +81,8 @@ class SearchResult:
     seconds: float
     matches: Integers
     cancelled: bool = False
+    one_to_one: float = 0.0
+    kernels: str = ""
 
     @property
     def gap(self) -> float:
@@ -102,7 +116,7 @@ def search(
     metric : str
         "hyperbolic" (invariant under Möbius transformations) or "euclidean" (the paper's).
     weights : (N1, N2) float, optional
-        In [0, 1]; 0 means incompatible. Rounded to multiples of 2^-24. Default: all 1.
+        In [0, 1]; 0 means incompatible. Rounded to multiples of 2^-20 or less (`Matching.unit`). Default: all 1.
     z_max : float
         Bound on |z|, in (0, 1).
     reflect : bool
@@ -110,7 +124,7 @@ def search(
     time_limit : float, optional
         Seconds after which the best so far is returned, with the bound proved by then.
     threads : int, optional
-        Has no effect on the result; this implementation uses one.
+        At most; default: one per processor. The result does not depend on it, unless time runs out.
     progress : callable, optional
         Called a few times a second with a `SearchProgress`; returns False to end the search.
 
@@ -139,111 +153,137 @@ def search(
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, not {threads}")
     plain = matching(source, target, radius, metric=metric, weights=weights)
-    return _branch_and_bound([plain, plain.reflected()] if reflect else [plain], z_max, time_limit, progress)
+    sides = [plain, plain.reflected()] if reflect else [plain]
+    return _Search(sides, z_max).run(time_limit, threads or os.cpu_count() or 1, progress)
 
 
-def _branch_and_bound(
-    sides: list[Matching],
-    z_max: float,
-    time_limit: float | None,
-    progress: Callable[[SearchProgress], bool | None] | None,
-) -> SearchResult:
-    """Search all `sides` (plain, reflected) at once, best bound first."""
-    started = time.perf_counter()
-    best, value = Mobius(), -1.0
-    # entries: -bound, half side, side, centre; the sum of real numbers breaks ties the same way on every machine
-    frontier: list[tuple[float, float, int, float, float]] = []
-    for side, problem in enumerate(sides):
-        heapq.heappush(frontier, (-problem.limit, 1.0, side, 0.0, 0.0))
-        best, value = _better(best, value, *_improved(problem, np.zeros(1, np.complex128), side == 1))
-    finished_bound = -np.inf  # of cells too small to split
-    nodes, cancelled, reported = 0, False, started
-    while frontier and -frontier[0][0] > value:
-        now = time.perf_counter()
-        if time_limit is not None and now - started > time_limit:
-            break
-        if progress is not None and now - reported > 0.1:
-            reported = now
-            if progress(SearchProgress(value, max(-frontier[0][0], finished_bound), nodes, now - started)) is False:
-                cancelled = True
-                break
-        side = frontier[0][2]
-        batch: list[tuple[float, float, int, float, float]] = []
-        while frontier and len(batch) < CELLS_AT_ONCE and frontier[0][2] == side and -frontier[0][0] > value:
-            batch.append(heapq.heappop(frontier))
-        problem = sides[side]
-        centre, half = _children(batch, z_max)
-        if len(centre) == 0:
-            continue
-        bounds = cell_bounds(problem, centre, half)
-        # a parent's bound holds for its children too; batch is a list of fours
-        nodes += len(centre)
-        alive = np.flatnonzero(bounds > value)
-        if len(alive):
-            inside = alive[np.abs(centre[alive]) <= z_max]
-            promising = inside[np.argsort(-bounds[inside], kind="stable")[:CELLS_AT_ONCE]]
-            if len(promising):
-                best, value = _better(best, value, *_improved(problem, centre[promising], side == 1))
-            alive = alive[bounds[alive] > value]
-        for k in alive.tolist():
-            if half[k] <= SMALLEST_CELL:
-                finished_bound = max(finished_bound, float(bounds[k]))
+class _Search:
+    """The state of one search: the best transformation so far, and the cells that may hold a better one."""
+
+    def __init__(self, sides: list[Matching], z_max: float) -> None:
+        self.sides, self.z_max = sides, z_max
+        self.kernels = [kernels_for(problem, z_max, SMALLEST_CELL) for problem in sides]
+        self.frontier = [whole_disc(problem.limit) for problem in sides]
+        self.best, self.best_side = Mobius(), 0
+        self.value = sides[0].value(self.best)
+        self.finished_bound = -np.inf  # of cells too small to split
+        self.nodes = 0
+
+    @property
+    def upper_bound(self) -> float:
+        """What no transformation exceeds."""
+        return max(self.value, self.finished_bound, *(open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier))
+
+    def run(
+        self, time_limit: float | None, threads: int, progress: Callable[[SearchProgress], bool | None] | None
+    ) -> SearchResult:
+        """Split cells, best bound first, until none can hold a better transformation or time is up."""
+        started = reported = time.perf_counter()
+        cancelled, budget = False, 4
+        # bounds per open cell and round: growing, as the value in hand is poor at first, to a twentieth of a second in all
+        most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
+        with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+            while self.upper_bound > max(self.value, self.finished_bound):
+                now = time.perf_counter()
+                if time_limit is not None and now - started > time_limit:
+                    break
+                if progress is not None and now - reported > 0.1:
+                    reported = now
+                    if progress(SearchProgress(self.value, self.upper_bound, self.nodes, now - started)) is False:
+                        cancelled = True
+                        break
+                self._round(budget, pool)
+                budget = min(2 * budget, most)
+        problem = self.sides[self.best_side]
+        plain = Mobius(self.best.z, self.best.theta)
+        upper = self.upper_bound
+        return SearchResult(
+            mobius=self.best,
+            value=self.value,
+            upper_bound=upper,
+            certified=bool(upper == self.value),
+            nodes=self.nodes,
+            seconds=time.perf_counter() - started,
+            matches=problem.matches(plain),
+            cancelled=cancelled,
+            one_to_one=one_to_one(problem, plain),
+            kernels=self.kernels[0].name,
+        )
+
+    def _round(self, budget: int, pool: ThreadPoolExecutor | None) -> None:
+        """Take the best open cells off the frontier, search in each for a while, and put back what is left of them."""
+        bounds = np.concatenate([open_[:, BOUND] for open_ in self.frontier])
+        full = len(bounds) > FRONTIER
+        rank = np.concatenate([open_[:, HALF] for open_ in self.frontier]) if full else -bounds
+        taken = np.zeros(len(bounds), bool)
+        count = min(CELLS_AT_ONCE, len(bounds))
+        taken[np.argpartition(rank, count - 1)[:count]] = True
+        first = 0
+        for side, open_ in enumerate(self.frontier):
+            chosen = taken[first : first + len(open_)]
+            first += len(open_)
+            cells = open_[chosen]
+            if len(cells) == 0:
+                continue
+            left = self._expanded(side, cells[np.argsort(-cells[:, BOUND], kind="stable")], budget, pool)
+            self._improve(side, left)
+            self.frontier[side] = np.concatenate([open_[~chosen], left])
+        for side, open_ in enumerate(self.frontier):
+            alive = open_[open_[:, BOUND] > self.value]
+            ended = alive[:, HALF] <= SMALLEST_CELL
+            self.finished_bound = max(self.finished_bound, alive[ended, BOUND].max(initial=-np.inf))
+            self.frontier[side] = alive[~ended]
+
+    def _expanded(self, side: int, cells: Floats, budget: int, pool: ThreadPoolExecutor | None) -> Floats:
+        """Return what is left of cells after splitting each for a while; the threads share the work."""
+        kernels, value = self.kernels[side], self.value
+        shares = [cells[k : k + 4] for k in range(0, len(cells), 4)] if pool else [cells]
+        run = pool.map if pool else map
+        parts = list(run(lambda share: kernels.expand(share, value, budget), shares))
+        self.nodes += sum(spent for _, spent in parts)
+        return np.concatenate([left for left, _ in parts])
+
+    def _improve(self, side: int, left: Floats) -> None:
+        """Look for a better transformation at the centres of the most promising cells, then around the best of them."""
+        kernels = self.kernels[side]
+        inside = left[np.hypot(left[:, X], left[:, Y]) <= self.z_max]
+        inside = inside[np.argsort(-inside[:, BOUND], kind="stable")[:CELLS_AT_ONCE]]
+        z = np.unique(inside[:, X] + 1j * inside[:, Y])
+        if len(z) == 0:
+            return
+        values, _ = kernels.rotations(z, self.value)
+        k = int(np.argmax(values))
+        if values[k] <= self.value:
+            return
+        z, value = complex(z[k]), float(values[k])
+        # a pattern search: the value is a step function, so there is no slope to follow
+        step = float(inside[:, HALF].max())
+        ring: Complexes = np.exp(2j * np.pi * np.arange(8) / 8)
+        while step > 1e-4:
+            around: Complexes = z + step * (1 - abs(z) ** 2) * ring
+            around = around[np.abs(around) <= self.z_max]
+            values, _ = kernels.rotations(around, value)
+            k = int(np.argmax(values)) if len(values) else -1
+            if k >= 0 and values[k] > value:
+                z, value = complex(around[k]), float(values[k])
             else:
-                heapq.heappush(
-                    frontier, (-float(bounds[k]), float(half[k]), side, float(centre[k].real), float(centre[k].imag))
-                )
-    left = -frontier[0][0] if frontier else -np.inf
-    upper = max(value, left, finished_bound)
-    problem = sides[int(best.reflected)] if len(sides) > 1 else sides[0]
-    return SearchResult(
-        mobius=best,
-        value=value,
-        upper_bound=upper,
-        certified=bool(upper == value),
-        nodes=nodes,
-        seconds=time.perf_counter() - started,
-        matches=problem.matches(Mobius(best.z, best.theta)),
-        cancelled=cancelled,
-    )
+                step /= 2
+        _, rotation = kernels.rotations(np.array([z]))
+        found = Mobius(z, float(rotation[0]))
+        value = self.sides[side].value(found)
+        if value > self.value:
+            self.value, self.best_side = value, side
+            self.best = Mobius(found.z, found.theta, side == 1)
 
 
-def cell_bounds(problem: Matching, centre: Complexes, half: Floats) -> Floats:
-    """Return, for each square cell of z, (C,), a number that Q does not exceed at any z in it and any theta."""
-    # the circumscribed disc's radius, rounded up
-    arcs = enclosing_arcs(problem, centre, half * (np.sqrt(2) * (1 + 2.0**-50)))
-    row, pair, middle, half_width = arcs
-    return stab(row, problem.point[pair], middle, half_width, problem.weight[pair], len(centre), len(problem.source))[0]
-
-
-def best_rotations(problem: Matching, z: Complexes) -> tuple[Floats, Floats]:
-    """Return U(z) = max over theta of Q, and such a theta in radians, for each z, (C,); to rounding error."""
-    row, pair, middle, half_width = exact_arcs(problem, z)
-    return stab(row, problem.point[pair], middle, half_width, problem.weight[pair], len(z), len(problem.source))
-
-
-def _improved(problem: Matching, z: Complexes, reflected: bool) -> tuple[Mobius, float]:
-    """Return the best transformation with z among the given, and its value as the definition has it."""
-    values, rotations = best_rotations(problem, z)
-    k = int(np.argmax(values))
-    plain = Mobius(complex(z[k]), float(rotations[k]))
-    return _mirrored(plain, reflected), problem.value(plain)
-
-
-def _mirrored(plain: Mobius, reflected: bool) -> Mobius:
-    """Return the transformation of the source itself, given the one of the (perhaps conjugated) source."""
-    return Mobius(plain.z, plain.theta, reflected)
-
-
-def _better(best: Mobius, value: float, other: Mobius, other_value: float) -> tuple[Mobius, float]:
-    """Return whichever transformation has the larger value; the first on a tie."""
-    return (other, other_value) if other_value > value else (best, value)
-
-
-def _children(batch: list[tuple[float, float, int, float, float]], z_max: float) -> tuple[Complexes, Floats]:
-    """Return centres and half sides of the quarters of the cells that reach into |z| <= z_max."""
-    half = np.repeat([cell[1] / 2 for cell in batch], 4)
-    parent = np.repeat([complex(cell[3], cell[4]) for cell in batch], 4)
-    centre = parent + half * np.tile([-1 - 1j, 1 - 1j, -1 + 1j, 1 + 1j], len(batch))
-    nearest = np.hypot(np.maximum(np.abs(centre.real) - half, 0), np.maximum(np.abs(centre.imag) - half, 0))
-    reaching = nearest <= z_max * (1 + 2.0**-50)
-    return centre[reaching], half[reaching]
+def one_to_one(problem: Matching, mobius: Mobius) -> float:
+    """Return the greatest weight of pairs within reach that share neither source nor target point."""
+    hits = problem.hits(mobius)
+    j, k = problem.point[hits], problem.target[hits]
+    if len(hits) == 0:
+        return 0.0
+    rows, row = np.unique(j, return_inverse=True)
+    columns, column = np.unique(k, return_inverse=True)
+    table = np.zeros((len(rows), len(columns)))
+    table[row, column] = problem.weight[hits]
+    return float(table[linear_sum_assignment(table, maximize=True)].sum())

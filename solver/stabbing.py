@@ -26,7 +26,7 @@ def stab(
     centre, half_width : (n,) float64
         The closed arc [centre - half_width, centre + half_width], radians; a half-width >= pi is the full circle.
     weight : (n,) float64
-        Multiples of `WEIGHT_UNIT`, so that every sum is exact.
+        Multiples of `Matching.unit`, so that every sum is exact.
     groups, points : int
         Number of groups and of source points.
 
@@ -90,7 +90,7 @@ def _envelope(owner: Integers, start: Floats, stop: Floats, weight: Floats) -> t
     rank = np.empty(2 * n, np.intp)
     rank[order] = np.arange(2 * n)
     # slot s lies between events s and s + 1; an interval covers the slots from its start to before its stop. The
-    # maximum over all intervals on each slot comes from a sparse table, filled at two places per interval and pushed down.
+    # maximum over all intervals on each slot comes from a sparse table, filled at two places per interval, pushed down
     low, length = rank[:n], rank[n:] - rank[:n]
     power = np.frexp(length.astype(np.float64))[1] - 1
     covered = np.zeros(2 * n)

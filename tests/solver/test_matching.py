@@ -3,7 +3,7 @@ import pytest
 from instances import disc_points, nasty_points, random_problem
 
 from solver import Mobius
-from solver.matching import WEIGHT_UNIT, matching
+from solver.matching import matching
 from solver.mobius import hyperbolic_distance
 
 rng = np.random.default_rng(3)
@@ -50,7 +50,7 @@ def test_weights_are_rounded_so_that_sums_are_exact():
     rng = np.random.default_rng(0)
     weights = rng.random((200, 1))
     problem = matching(disc_points(rng, 200, 0.9), [0.1], 0.5, weights=weights)
-    assert np.abs(problem.weight - weights[:, 0]).max() <= WEIGHT_UNIT / 2
+    assert np.abs(problem.weight - weights[:, 0]).max() <= problem.unit / 2 <= 2.0**-21
     assert np.sum(problem.weight) == sum(problem.weight[rng.permutation(200)].tolist()) == problem.limit
 
 

@@ -1,0 +1,188 @@
+"""kernels.c through ctypes. The calls let go of Python's lock, so that threads run them side by side."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import logging
+import threading
+from functools import cache
+
+import numpy as np
+
+from ..bounds import reaches, tangents
+from ..matching import Matching
+from ..mesh import Complexes, Floats
+from .nodes import BOUND, new_nodes
+
+INTERFACE = 1
+"""Of kernels.c: a library that says another number is not used."""
+
+ARENA = 1 << 20
+"""Pairs that one thread can hold for the cells it has open, 8 bytes each; cells beyond look at all pairs again."""
+
+STACK = 2048
+"""Open cells of one subtree at most, as in kernels.c."""
+
+log = logging.getLogger(__name__)
+_I64, _F64, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+
+class _Problem(ctypes.Structure):
+    _fields_ = [
+        ("points", _I64),
+        *((name, _POINTER) for name in ("mx", "my", "start", "stop", "inner", "outer", "reach", "b", "e", "turn")),
+        *((name, _POINTER) for name in ("tangent", "wide", "weight")),
+        ("z_max", _F64),
+        ("smallest", _F64),
+    ]
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """Return the fastest library that runs here, or None, which the log explains in a sentence."""
+    try:
+        found = importlib.import_module("mobius_kernels").LIBRARIES
+        plain = _checked(ctypes.CDLL(str(found[0])))
+        if len(found) > 1 and plain.mobius_runs_v3():
+            return _checked(ctypes.CDLL(str(found[1])))
+    except (ImportError, OSError) as error:
+        log.warning("No compiled kernels (%s): the search runs in numpy, many times slower.", error)
+        return None
+    return plain
+
+
+def _checked(loaded: ctypes.CDLL) -> ctypes.CDLL:
+    if loaded.mobius_interface() != INTERFACE:
+        raise ImportError(f"mobius_kernels has interface {loaded.mobius_interface()}, not {INTERFACE}")
+    loaded.mobius_work_bytes.restype = _I64
+    loaded.mobius_work_bytes.argtypes = [_I64, _I64]
+    loaded.mobius_images.restype = None
+    loaded.mobius_images.argtypes = [_I64, _POINTER, _POINTER, _F64, _F64, _F64, _F64, _F64, *[_POINTER] * 4]
+    loaded.mobius_bounds.restype = None
+    loaded.mobius_bounds.argtypes = [_POINTER, _POINTER, _I64, _POINTER, _I64]
+    loaded.mobius_rotations.restype = None
+    loaded.mobius_rotations.argtypes = [*[_POINTER] * 5, _I64, _F64, _POINTER, _I64]
+    loaded.mobius_expand.restype = _I64
+    loaded.mobius_expand.argtypes = [_POINTER, _POINTER, _I64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]
+    return loaded
+
+
+class CompiledKernels:
+    """The kernels for one matching, in C; see `ReferenceKernels` for the same in numpy.
+
+    Weights and bounds are whole numbers of `Matching.unit` on the other side.
+    """
+
+    name = "compiled"
+
+    def __init__(self, problem: Matching, z_max: float, smallest: float) -> None:
+        loaded = library()
+        if loaded is None:
+            raise ImportError("mobius_kernels is not installed")
+        self._library = loaded
+        self.unit = problem.unit
+        self.points = len(problem.source)
+        order, start, stop = _rows(problem)
+        inner, outer = (x[order] for x in reaches(problem))
+        tangent, wide = (x[order] for x in tangents(problem))
+        # the running maximum along each row: pairs before its first entry >= near cannot reach near
+        reach = outer.copy()
+        for a, b in set(zip(start.tolist(), stop.tolist(), strict=True)):
+            np.maximum.accumulate(outer[a:b], out=reach[a:b])
+        centre = problem.centre[order]
+        arrays: dict[str, np.ndarray | None] = {
+            "mx": problem.source.real,
+            "my": problem.source.imag,
+            "start": start,
+            "stop": stop,
+            "inner": inner,
+            "outer": outer,
+            "reach": reach,
+            "b": np.abs(centre),
+            "e": problem.radius[order],
+            "turn": np.angle(centre) / (2 * np.pi),
+            "tangent": tangent,
+            "wide": wide / (2 * np.pi),
+            "weight": None if problem.unit == 1 else np.round(problem.weight[order] / problem.unit).astype(np.uint32),
+        }
+        # kept, because the structure holds bare addresses
+        self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
+        addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
+        self._problem = _Problem(points=self.points, z_max=z_max, smallest=smallest, **addresses)
+        self._local = threading.local()
+
+    def _work(self) -> int:
+        """Return the address of this thread's working memory."""
+        if not hasattr(self._local, "memory"):
+            self._local.memory = np.empty(self._library.mobius_work_bytes(self.points, ARENA), np.uint8)
+        return self._local.memory.ctypes.data
+
+    def images(self, z: complex, half: float, kappa: complex) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return `bounds.images` of one cell, angles in turns."""
+        alpha, delta, near, far = np.zeros((4, self.points))
+        mx, my = self._problem.mx, self._problem.my
+        addresses = [x.ctypes.data for x in (alpha, delta, near, far)]
+        self._library.mobius_images(self.points, mx, my, z.real, z.imag, half, kappa.real, kappa.imag, *addresses)
+        return alpha, delta, near, far
+
+    def bounds(self, nodes: Floats) -> Floats:
+        """Return `nodes` with their own bound and kappa filled in."""
+        nodes = np.array(nodes, dtype=np.float64, order="C")
+        self._library.mobius_bounds(ctypes.addressof(self._problem), nodes.ctypes.data, len(nodes), self._work(), ARENA)
+        nodes[:, BOUND] *= self.unit
+        return nodes
+
+    def rotations(self, z: Complexes, value: float = -1.0) -> tuple[Floats, Floats]:
+        """Return U(z), and a theta that attains it, for each z, (C,); where U(z) <= `value`, any bound that tells."""
+        x, y = np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
+        turns, bounds = np.zeros(len(z)), np.zeros(len(z))
+        addresses = [a.ctypes.data for a in (x, y, turns, bounds)]
+        self._library.mobius_rotations(
+            ctypes.addressof(self._problem), *addresses, len(z), value / self.unit, self._work(), ARENA
+        )
+        return bounds * self.unit, turns * (2 * np.pi)
+
+    def expand(self, nodes: Floats, value: float, budget: int) -> tuple[Floats, int]:
+        """Return what is left of cells after searching each, depth first, for `budget` bounds, and how many it took."""
+        given = np.array(nodes, dtype=np.float64, order="C")
+        given[:, BOUND] /= self.unit
+        counts = np.zeros(4, np.int64)
+        parts, spent = [], 0
+        while len(given):
+            room = new_nodes(2 * STACK)
+            done = self._library.mobius_expand(
+                ctypes.addressof(self._problem),
+                given.ctypes.data,
+                len(given),
+                value / self.unit,
+                budget,
+                room.ctypes.data,
+                len(room),
+                counts.ctypes.data,
+                self._work(),
+                ARENA,
+            )
+            given = np.ascontiguousarray(given[done:])
+            parts.append(room[: counts[0]])
+            spent += int(counts[1])
+        left = np.concatenate(parts) if parts else new_nodes(0)
+        left[:, BOUND] *= self.unit
+        return left, spent
+
+
+def _rows(problem: Matching) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return an order of pairs, and where in it each source point's row starts and stops; rows sorted by reach.
+
+    If every source point may match every target point, all of them share one row.
+    """
+    count = len(problem.source)
+    inner = reaches(problem)[0]
+    width = len(problem.point) // count
+    if problem.unit == 1 and (problem.point == np.repeat(np.arange(count), width)[: len(problem.point)]).all():
+        shared = problem.target.reshape(count, width) if width * count == len(problem.target) else None
+        if shared is not None and (shared == shared[0]).all():
+            return np.argsort(inner[:width], kind="stable"), np.zeros(count, np.int64), np.full(count, width, np.int64)
+    order = np.lexsort([inner, problem.point])
+    bounds = np.searchsorted(problem.point, np.arange(count + 1)).astype(np.int64)
+    return order, bounds[:-1].copy(), bounds[1:].copy()
