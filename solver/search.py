@@ -180,7 +180,7 @@ class _Search:
         """Split cells, best bound first, until none can hold a better transformation or time is up."""
         started = reported = time.perf_counter()
         cancelled, budget = False, 4
-        # bounds per open cell and round: growing, as the value in hand is poor at first, to a twentieth of a second in all
+        # bounds per open cell and round: growing, as the value in hand is poor at first, to a twentieth of a second
         most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
             while self.upper_bound > max(self.value, self.finished_bound):
