@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import sys
+import traceback
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -93,7 +94,11 @@ def main(arguments: list[str], prog: str = "python .") -> int:
 def main_quietly(arguments: list[str], prog: str = "python .") -> int:
     """Run one command with standard output and errors to itself: what Blender's importers say there goes nowhere."""
     with _own_streams():
-        return main(arguments, prog)
+        try:
+            return main(arguments, prog)
+        except Exception:  # a fault of the program: shown here, as past these streams nothing is seen
+            traceback.print_exc()
+            return 1
 
 
 @contextmanager

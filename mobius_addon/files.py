@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
-import bpy
 
 from .mesh_data import Refusal
 
