@@ -6,7 +6,10 @@ values (`interpolate`).
 """
 
 from .align import Alignment, AlignSettings, Cancelled, Progress, align
+from .circle_packing import silhouette_mesh
+from .cleaning import Cleaned, cleaned
 from .correspond import Correspondence, correspond
+from .distortion import Distortion
 from .flatten import Flattening, flatten
 from .interpolate import interpolate, interpolate_corners
 from .map_file import load_map, save_map
@@ -20,7 +23,9 @@ __all__ = [
     "AlignSettings",
     "Alignment",
     "Cancelled",
+    "Cleaned",
     "Correspondence",
+    "Distortion",
     "Flattening",
     "MeshError",
     "Mobius",
@@ -30,6 +35,7 @@ __all__ = [
     "Topology",
     "TriangleMesh",
     "align",
+    "cleaned",
     "correspond",
     "flatten",
     "interpolate",
@@ -39,5 +45,6 @@ __all__ = [
     "require_disc",
     "save_map",
     "search",
+    "silhouette_mesh",
     "topology",
 ]

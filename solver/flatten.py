@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .circle import on_circle
+from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
 from .holes import filled
@@ -19,7 +20,7 @@ from .mid_edge import mid_edge_map
 from .mobius import Mobius, conformal_barycentre
 from .topology import Topology, require_disc
 
-METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map}
+METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map, "circle-packing": packed}
 """Each takes an intrinsic triangulation and its boundary, and returns the disc."""
 
 
@@ -69,6 +70,7 @@ def flatten(
     method : str
         "harmonic": harmonic measure and harmonic extension on intrinsic Delaunay weights (`harmonic.riemann_map`).
         "mid-edge": conjugate harmonic functions at the edges' midpoints (`mid_edge.mid_edge_map`).
+        "circle-packing": a circle for each vertex, for a lattice of equal triangles (`circle_packing.packed`).
     fill_holes : bool
         Allow openings: all boundary loops but the outer one are closed for the computation (`holes.filled`).
     outer_vertex : int, optional

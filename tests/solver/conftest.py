@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gif import read_gif
 
 from solver import TriangleMesh
 
@@ -37,6 +38,12 @@ def real_mesh(data_path: Callable[[str], Path]) -> Callable[[str], TriangleMesh]
         return TriangleMesh(vertices, faces, path.stem)
 
     return load
+
+
+@pytest.fixture(scope="session")
+def silhouette(data_path: Callable[[str], Path]) -> Callable[[str], np.ndarray]:
+    """Load a silhouette, as in ``silhouette("car-01.gif")``: (height, width) bool, True inside."""
+    return lambda name: read_gif(data_path(f"silhouettes/{name}")) > 127
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
