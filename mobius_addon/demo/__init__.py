@@ -18,12 +18,12 @@ from ... import solver
 from .. import stored_alignment
 from ..attributes import KINDS, Carrier, plan_transfer
 from ..command_line import DONE, say, say_error
-from ..files import Unreadable, new_scene, outputs
+from ..files import Unreadable, new_scene, outputs, quiet
 from ..mesh_data import Refusal, Surface, read_surface
 from ..operators.align import summary, write_alignment
 from ..operators.transfer import describe_counts
 from .accuracy import best_rigid_error, transfer_error
-from .paint import FACE_PAINT, GRID_UV, paint
+from .paint import FACE_PAINT, GRID_UV, paint_source
 from .pictures import Disc, Sitter, clay_material, hues, paint_material, render_discs, render_heads, require_cycles
 from .scans import POSE, GroundTruth, build_scans
 
@@ -49,8 +49,12 @@ def run(output_dir: Path) -> int:
     Unreadable
         The folder cannot be made or written to.
     Refusal, MeshError
-        Something failed on the way; nothing is left behind.
+        Something failed on the way, or a person is at work in this Blender; nothing is left behind.
     """
+    if not bpy.app.background:
+        raise Refusal(
+            "the demo begins with an empty file, which would close yours: run it from the command line"
+        )
     seconds: dict[str, float] = {}
     with writable_folder(output_dir), outputs() as written:
         require_cycles()
@@ -140,7 +144,7 @@ def build_objects(scene: bpy.types.Scene) -> tuple[bpy.types.Object, bpy.types.O
     target = bpy.data.objects.new(scans.target.name, scans.target)
     for obj in (source, target):
         scene.collection.objects.link(obj)
-    paint(source)
+    paint_source(source)
     return source, target, scans.truth
 
 
@@ -206,6 +210,7 @@ def save_blend(path: Path) -> None:
     """
     bpy.data.orphans_purge(do_recursive=True)
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=True, check_existing=False)
+        with quiet():
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=True, check_existing=False)
     except RuntimeError as error:
         raise Refusal(f"'{path.name}' could not be written: {error}") from error

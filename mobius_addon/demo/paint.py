@@ -29,7 +29,7 @@ PUPIL = (0.006, 0.006, 0.008)
 LIPS = (0.380, 0.030, 0.080)
 
 
-def paint(source: bpy.types.Object) -> None:
+def paint_source(source: bpy.types.Object) -> None:
     """Give the source scan everything that the demo carries over."""
     mesh = source.data
     vertices = read_vertices(mesh)

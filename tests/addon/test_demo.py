@@ -16,8 +16,8 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 from mobius_extension import solver  # noqa: E402
 from mobius_extension.mobius_addon import demo  # noqa: E402
 from mobius_extension.mobius_addon.command_line import main  # noqa: E402
-from mobius_extension.mobius_addon.demo import accuracy, pictures, scans  # noqa: E402
-from mobius_extension.mobius_addon.demo.paint import FACE_PAINT, GRID_UV, face_paint, front_view  # noqa: E402
+from mobius_extension.mobius_addon.demo import accuracy, paint, pictures, scans  # noqa: E402
+from mobius_extension.mobius_addon.demo.paint import FACE_PAINT, GRID_UV, SMILE, face_paint, front_view  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import Refusal, foreach, read_surface  # noqa: E402
 
 FILES = ["REPORT.json", "correspondence.png", "demo.blend", "discs.png"]
@@ -167,19 +167,13 @@ def test_the_blend_holds_the_two_scans_and_what_was_carried(finished: Path, buil
     uv = foreach(target.data.uv_layers[GRID_UV].uv, "vector", 2, np.float32)
     assert np.linalg.norm(uv - front_view(rest)[corner_vertex], axis=1).mean() < 0.02
     for group in ("Jaw", "Brow.L", "Brow.R", "Ear.L", "Ear.R"):
-        true = scans_weight(group, rest)
+        true = paint.weights(rest)[group]
         assert np.abs(weights(target, group) - true).mean() < 0.02
         assert true.max() == pytest.approx(1, abs=0.01)
     for obj in (source, target):
         (material,) = obj.data.materials
         assert {node.layer_name for node in material.node_tree.nodes if node.type == "VERTEX_COLOR"} == {FACE_PAINT}
-    assert [key.value for key in source.data.shape_keys.key_blocks] == [0, 0]
-
-
-def scans_weight(group: str, rest: np.ndarray) -> np.ndarray:
-    from mobius_extension.mobius_addon.demo.paint import weights as painted_weights
-
-    return painted_weights(rest)[group]
+    assert source.data.shape_keys.key_blocks[SMILE].value == 0
 
 
 def test_pictures_leave_no_data_behind(built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
