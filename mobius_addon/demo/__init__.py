@@ -52,9 +52,7 @@ def run(output_dir: Path) -> int:
         Something failed on the way, or a person is at work in this Blender; nothing is left behind.
     """
     if not bpy.app.background:
-        raise Refusal(
-            "the demo begins with an empty file, which would close yours: run it from the command line"
-        )
+        raise Refusal("the demo begins with an empty file, which would close yours: run it from the command line")
     seconds: dict[str, float] = {}
     with writable_folder(output_dir), outputs() as written:
         require_cycles()
