@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Euler
 from scipy.spatial.transform import Rotation
 
 from ... import solver
@@ -174,14 +176,19 @@ def discs(alignment: solver.Alignment, source: bpy.types.Object, target: bpy.typ
 
 
 def dress(source: bpy.types.Object, target: bpy.types.Object, worn: bpy.types.Material) -> None:
-    """Show the paint on both objects, and in the file's own windows."""
+    """Show the paint on both objects, and let the file's own windows look at them from the front."""
     for obj in (source, target):
         obj.data.materials.clear()
         obj.data.materials.append(worn)
+    corners = np.concatenate([np.array(obj.bound_box) for obj in (source, target)])
     for screen in bpy.data.screens:
         for area in screen.areas:
             if area.type == "VIEW_3D":
-                area.spaces.active.shading.type = "MATERIAL"
+                space = area.spaces.active
+                space.shading.type = "MATERIAL"
+                space.region_3d.view_location = (corners.min(axis=0) + corners.max(axis=0)) / 2
+                space.region_3d.view_rotation = Euler((math.radians(80), 0, 0)).to_quaternion()
+                space.region_3d.view_distance = 1.2 * float(np.ptp(corners, axis=0).max())
 
 
 def keep_for_the_panel(
