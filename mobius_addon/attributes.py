@@ -61,12 +61,9 @@ class Carrier:
         result = np.zeros((total, *carried.shape[1:]))
         result[corners] = carried
         # a polygon is carried as a whole or not at all
-        polygon = self.target.triangle_polygon
-        whole = np.ones(polygon.max() + 1, bool)
-        whole[polygon[(self.correspondence.face[faces] < 0).any(axis=1)]] = False
-        covered = np.zeros(total, bool)
-        covered[corners] = np.repeat(whole[polygon], 3)
-        return result, covered
+        bare = self.correspondence.face[self.target.corner_vertex] < 0
+        polygon = self.target.corner_polygon
+        return result, (np.bincount(polygon, bare) == 0)[polygon]
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,6 +233,11 @@ class Kind:
     label: str
     description: str
 
+    @property
+    def noun(self) -> str:
+        """The label within a sentence, in the plural."""
+        return self.label.lower().replace("uv", "UV")
+
 
 KINDS = (
     Kind("vertex-groups", "Vertex Groups", "Weights of every vertex group; locked groups of the target are left alone"),
@@ -356,7 +358,7 @@ def plan_transfer(
                 warnings.append(f"'{target.name}' has something else named '{layer.name}': it becomes '{name}'")
             layers.append(Carried(row, layer.name, name, *row.carry(carrier, layer.values)))
     if not layers:
-        wanted = " or ".join(kind.label.lower() for kind in KINDS if kind.identifier in chosen)
+        wanted = " or ".join(kind.noun for kind in KINDS if kind.identifier in chosen)
         locked = f" ({'; '.join(warnings)})" if warnings else ""
         raise Refusal(f"'{source.name}' has no {wanted} to transfer{locked}")
     maps = {x.name for x in layers if x.row.kind == "uv"} | {x.name for x in target.data.uv_layers}

@@ -9,18 +9,15 @@ import argparse
 import json
 import os
 import sys
-import traceback
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    import bpy
-
     from ..solver import Alignment, AlignSettings, Correspondence
     from .attributes import Transfer
+    from .files import Imported
     from .mesh_data import Surface
 
 DONE, NOT_ALIGNED, UNUSABLE = 0, 1, 2
@@ -93,31 +90,21 @@ def main(arguments: list[str], prog: str = "python .") -> int:
 
 def main_quietly(arguments: list[str], prog: str = "python .") -> int:
     """Run one command with standard output and errors to itself: what Blender's importers say there goes nowhere."""
-    with _own_streams():
-        try:
-            return main(arguments, prog)
-        except Exception:  # a fault of the program: shown here, as past these streams nothing is seen
-            traceback.print_exc()
-            return 1
+    _take_streams()
+    return main(arguments, prog)
 
 
-@contextmanager
-def _own_streams() -> Iterator[None]:
-    # Blender writes to the file descriptors, past Python; what it holds back in buffers comes out at exit, so they
-    # are not given back
-    sys.stdout.flush()
-    sys.stderr.flush()
-    with (
-        os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace") as out,
-        os.fdopen(os.dup(2), "w", encoding="utf-8", errors="replace") as err,
-        redirect_stdout(out),
-        redirect_stderr(err),
-    ):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
-        os.close(nowhere)
-        yield
+def _take_streams() -> None:
+    """Leave Blender, which writes past Python to the file descriptors, without an audience.
+
+    They are not given back: what Blender holds in its buffers comes out when the process ends.
+    """
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for descriptor, name in ((1, "stdout"), (2, "stderr")):
+        getattr(sys, name).flush()
+        setattr(sys, name, os.fdopen(os.dup(descriptor), "w", encoding="utf-8", errors="replace", buffering=1))
+        os.dup2(nowhere, descriptor)
+    os.close(nowhere)
 
 
 def _parser(prog: str) -> argparse.ArgumentParser:
@@ -227,7 +214,7 @@ def _flatten(options: argparse.Namespace) -> int:
 
     _require_writable(meshes=[options.output])
     new_scene()
-    obj = import_mesh(options.mesh)
+    obj = import_mesh(options.mesh).obj
     surface = read_surface(obj, options.mesh)
     flattening = flatten(surface.mesh)
     write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
@@ -250,13 +237,14 @@ def _align(options: argparse.Namespace) -> int:
     settings = _align_settings(options)
     _require_writable(others=[options.map, options.report])
     new_scene()
-    _, _, surfaces = _import_pair(options)
-    alignment, correspondence = _aligned(options, surfaces, settings)
+    source, target = _import_pair(options)
+    alignment, correspondence = _aligned(options, _surfaces(options, source, target), settings)
     with outputs() as written:
         if options.map:
             save_map(written.path(options.map), alignment, correspondence)
         if options.report:
             _write_report(written.path(options.report), report(alignment, correspondence))
+    _warn_of_order(options.map, (source, target))
     return DONE
 
 
@@ -272,16 +260,17 @@ def _transfer(options: argparse.Namespace) -> int:
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
     _require_writable(meshes=[options.output], others=[options.map, options.report])
     new_scene()
-    source, target, surfaces = _import_pair(options)
+    source, target = _import_pair(options)
+    surfaces = _surfaces(options, source, target)
     alignment = None
     if options.use_map:
         correspondence = _fitting_map(load_map, options, surfaces)
     else:
         alignment, correspondence = _aligned(options, surfaces, settings)
-    plan = plan_transfer(source, target, Carrier(correspondence, *surfaces), kinds)
-    plan.write(target)
+    plan = plan_transfer(source.obj, target.obj, Carrier(correspondence, *surfaces), kinds)
+    plan.write(target.obj)
     with outputs() as written:
-        export_mesh(target, written.path(options.output))
+        export_mesh(target.obj, written.path(options.output))
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence)
         if alignment and options.report:
@@ -290,6 +279,7 @@ def _transfer(options: argparse.Namespace) -> int:
     for warning in plan.warnings:
         say_error(f"mobius: warning: {warning}")
     _warn_of_losses(options.output, plan.counts())
+    _warn_of_order(options.map, (source, target))
     say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}")
     return DONE
 
@@ -326,18 +316,22 @@ def _require_writable(meshes: Iterable[Path] = (), others: Iterable[Path | None]
         raise Unreadable("two outputs have the same name")
 
 
-def _import_pair(
-    options: argparse.Namespace,
-) -> tuple[bpy.types.Object, bpy.types.Object, tuple[Surface, Surface]]:
-    """Return the source object, the target object, and both as arrays."""
+def _import_pair(options: argparse.Namespace) -> tuple[Imported, Imported]:
+    """Return source and target."""
     from .files import import_mesh
-    from .mesh_data import Refusal, read_surface
+    from .mesh_data import Refusal
 
     if _same_mesh(options.source, options.target):
         raise Refusal(f"'{options.source}' is both source and target: give two meshes")
     target = import_mesh(options.target)  # first, so that its materials and images keep their names
-    source = import_mesh(options.source)
-    return source, target, (read_surface(source, options.source), read_surface(target, options.target))
+    return import_mesh(options.source), target
+
+
+def _surfaces(options: argparse.Namespace, source: Imported, target: Imported) -> tuple[Surface, Surface]:
+    """Return source and target as arrays, named as on the command line."""
+    from .mesh_data import read_surface
+
+    return read_surface(source.obj, options.source), read_surface(target.obj, options.target)
 
 
 def _same_mesh(source: str, target: str) -> bool:
@@ -400,11 +394,20 @@ def _write_report(path: Path, figures: dict[str, Any]) -> None:
 
 def _warn_of_losses(path: Path, kinds: Iterable[str]) -> None:
     """Say what a file of this kind cannot hold."""
+    from .attributes import KINDS
     from .files import format_of
 
-    lost = [kind for kind in kinds if kind not in format_of(path).keeps]
+    nouns = {kind.identifier: kind.noun for kind in KINDS}
+    lost = [nouns[kind] for kind in kinds if kind not in format_of(path).keeps]
     if lost:
         say_error(f"mobius: warning: {path.suffix} files cannot hold {', '.join(lost)}: write a .blend to keep them")
+
+
+def _warn_of_order(map_path: Path | None, meshes: Iterable[Imported]) -> None:
+    """Say where the map that was written does not count a file's vertices as the file does."""
+    for imported in meshes if map_path else ():
+        if reason := imported.order_change():
+            say_error(f"mobius: warning: the map counts the vertices of '{imported.path}' otherwise: {reason}")
 
 
 _handle: Any = None

@@ -6,14 +6,16 @@ import io
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
+import bmesh
+import numpy as np
 
-from .mesh_data import Refusal
+from .mesh_data import Refusal, foreach
 
 
 class Unreadable(Refusal):
@@ -30,11 +32,14 @@ class Format:
         Read a path into the scene; write the selected objects to a path.
     keeps : frozenset of str
         The kinds of `attributes.KINDS` that such a file can hold.
+    join : callable
+        Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
 
     importer: Callable[[str], object]
     exporter: Callable[[str], object]
     keeps: frozenset[str]
+    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
@@ -60,9 +65,30 @@ def _save_blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False)
 
 
-def _load_gltf(path: str) -> None:
-    # a glTF file repeats a vertex for each of its normals and UVs, which would cut the surface open
-    _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path, merge_vertices=True)
+def _join_coinciding(mesh: bpy.types.Mesh) -> int:
+    """Join vertices at exactly the same place and return how many disappeared.
+
+    Files that store one normal and one UV per vertex repeat vertices along seams and sharp edges; as they stand, the
+    surface would be cut open there.
+    """
+    places = foreach(mesh.vertices, "co", 3, np.float32)
+    _, first, place_of = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    repeated = np.flatnonzero(first[place_of.ravel()] != np.arange(len(places)))
+    if repeated.size:
+        edit = bmesh.new()
+        edit.from_mesh(mesh)
+        edit.verts.ensure_lookup_table()
+        kept = first[place_of.ravel()[repeated]]
+        pairs = zip(repeated.tolist(), kept.tolist(), strict=True)
+        bmesh.ops.weld_verts(edit, targetmap={edit.verts[gone]: edit.verts[stays] for gone, stays in pairs})
+        edit.to_mesh(mesh)
+        edit.free()
+    return int(repeated.size)
+
+
+def _join_along_seams(mesh: bpy.types.Mesh) -> int:
+    """Join coinciding vertices of a mesh with UVs; without them the file had no reason to repeat any."""
+    return _join_coinciding(mesh) if mesh.uv_layers else 0
 
 
 def _save_gltf(path: str) -> None:
@@ -84,13 +110,19 @@ _PLY = Format(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors="SRGB"
     ),
     frozenset({"colors", "uv", "attributes"}),
+    _join_along_seams,
 )
 _STL = Format(
     lambda path: bpy.ops.wm.stl_import(filepath=path),
     lambda path: bpy.ops.wm.stl_export(filepath=path, export_selected_objects=True, apply_modifiers=False),
     frozenset(),
 )
-_GLTF = Format(_load_gltf, _save_gltf, frozenset({"colors", "uv"}))
+_GLTF = Format(
+    lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path),
+    _save_gltf,
+    frozenset({"colors", "uv"}),
+    _join_coinciding,
+)
 _FBX = Format(
     lambda path: _operator("import_scene.fbx", "io_scene_fbx")(filepath=path),
     lambda path: _operator("export_scene.fbx", "io_scene_fbx")(
@@ -156,10 +188,35 @@ def new_scene() -> None:
 
 @dataclass(frozen=True)
 class Imported:
-    """An object from a file, with the name that it has there (the scene's other objects may force another on it)."""
+    """An object from a file.
 
+    Attributes
+    ----------
+    path : Path
+        The file.
+    name : str
+        The object's name there; the scene's other objects may force another on it.
+    obj : bpy.types.Object
+        The object.
+    joined : int
+        Vertices that were joined with others at the very same place.
+    """
+
+    path: Path
     name: str
     obj: bpy.types.Object
+    joined: int = 0
+
+    def order_change(self) -> str | None:
+        """Return why the object's vertices are not numbered as in the file, or None if they are."""
+        if self.joined:
+            return f"{self.joined:,} that repeat another one's place were joined with it"
+        if self.path.suffix.lower() == ".obj":
+            with self.path.open("rb") as lines:
+                dropped = sum(line.startswith(b"v ") for line in lines) - len(self.obj.data.vertices)
+            if dropped:
+                return f"Blender leaves out {dropped:,} that no face of this object uses"
+        return None
 
 
 def import_meshes(path: Path) -> list[Imported]:
@@ -183,20 +240,20 @@ def import_meshes(path: Path) -> list[Imported]:
     except (RuntimeError, OSError) as error:
         raise Unreadable(f"'{path}' could not be read: {_reason(error)}") from error
     finally:
-        found = [Imported(obj.name, obj) for obj in bpy.data.objects if obj not in before]
+        found = [Imported(path, obj.name, obj) for obj in bpy.data.objects if obj not in before]
         for imported in found:
             if imported.name in before.values():
                 imported.obj.name = f"{imported.name}.001"
         for obj, name in before.items():
             obj.name = name
     bpy.context.view_layer.update()
-    meshes = [imported for imported in found if imported.obj.type == "MESH"]
+    meshes = [replace(x, joined=form.join(x.obj.data)) for x in found if x.obj.type == "MESH"]
     if not meshes:
         raise Unreadable(f"'{path}' holds no mesh")
     return sorted(meshes, key=lambda imported: imported.name)
 
 
-def import_mesh(argument: str) -> bpy.types.Object:
+def import_mesh(argument: str) -> Imported:
     """Import the one mesh that FILE or FILE:Object names.
 
     Raises
@@ -210,11 +267,11 @@ def import_mesh(argument: str) -> bpy.types.Object:
     if wanted is not None:
         for imported in meshes:
             if imported.name == wanted:
-                return imported.obj
+                return imported
         raise Unreadable(f"'{path}' has no mesh object named '{wanted}': it has {listed}")
     if len(meshes) > 1:
         raise Unreadable(f"'{path}' has {len(meshes)} mesh objects ({listed}): name one as {path}:NAME")
-    return meshes[0].obj
+    return meshes[0]
 
 
 def export_mesh(obj: bpy.types.Object, path: Path) -> None:

@@ -28,16 +28,16 @@ class Surface:
         is mirrored here too (x negated, triangles turned round), so that left and right are what the person sees.
     triangle_corners : (m, 3) int
         Index of the face corner (Blender's loop) at each corner of each triangle.
-    triangle_polygon : (m,) int
-        Index of the polygon that each triangle is a piece of.
     corner_vertex : (c,) int
         Vertex of each face corner.
+    corner_polygon : (c,) int
+        Polygon of each face corner.
     """
 
     mesh: TriangleMesh
     triangle_corners: Integers
-    triangle_polygon: Integers
     corner_vertex: Integers
+    corner_polygon: Integers
 
     def fingerprint(self) -> str:
         """Return a hash of vertices and triangles, which any edit of the shape changes."""
@@ -74,12 +74,12 @@ def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
     vertices = foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
     corner_vertex = foreach(mesh.loops, "vertex_index", 1, np.int32)
     corners = foreach(mesh.loop_triangles, "loops", 3, np.int32)
-    polygons = foreach(mesh.loop_triangles, "polygon_index", 1, np.int32)
+    corner_polygon = np.repeat(np.arange(len(mesh.polygons)), foreach(mesh.polygons, "loop_total", 1, np.int32))
     if is_mirrored(obj):
         vertices[:, 0] *= -1
         corners = corners[:, ::-1]
     triangles = TriangleMesh(vertices, corner_vertex[corners], name or obj.name)
-    return Surface(triangles, corners.astype(np.intp), polygons.astype(np.intp), corner_vertex.astype(np.intp))
+    return Surface(triangles, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon)
 
 
 def is_mirrored(obj: bpy.types.Object) -> bool:

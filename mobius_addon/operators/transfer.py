@@ -49,9 +49,5 @@ class MOBIUS_OT_transfer(TransferOptions, bpy.types.Operator):
 
 def describe_counts(counts: dict[str, int]) -> str:
     """Return what a transfer carried, as in '3 vertex groups, 1 UV map'."""
-    labels = {kind.identifier: kind.label for kind in KINDS}
-    parts = []
-    for kind, number in counts.items():
-        noun = labels[kind].lower().replace("uv", "UV")
-        parts.append(f"{number} {noun if number > 1 else noun.removesuffix('s')}")
-    return ", ".join(parts)
+    nouns = {kind.identifier: kind.noun for kind in KINDS}
+    return ", ".join(f"{n} {nouns[kind] if n > 1 else nouns[kind].removesuffix('s')}" for kind, n in counts.items())

@@ -1,0 +1,86 @@
+"""Meshes as arrays: what Blender draws, and the way back."""
+
+import numpy as np
+import pytest
+from scenes import make_object, make_sheet
+
+bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
+
+from mobius_extension.mobius_addon.mesh_data import read_surface, scale_warning  # noqa: E402
+from mobius_extension.solver import MeshError, topology  # noqa: E402
+
+
+def test_polygons_of_any_size_become_the_triangles_that_blender_draws() -> None:
+    corners = [(np.cos(a), np.sin(a), 0) for a in np.linspace(0, 2 * np.pi, 5, endpoint=False)]
+    obj = make_object("Mixed", [*corners, (2, 0, 0), (2, 1, 0)], [(0, 1, 2, 3, 4), (0, 5, 6, 1)])
+    surface = read_surface(obj)
+    assert len(surface.mesh.faces) == 3 + 2
+    assert surface.corner_polygon.tolist() == [0] * 5 + [1] * 4
+    assert (surface.corner_vertex[surface.triangle_corners] == surface.mesh.faces).all()
+    obj.data.calc_loop_triangles()
+    assert [list(triangle.vertices) for triangle in obj.data.loop_triangles] == surface.mesh.faces.tolist()
+    # each triangle stays inside its polygon
+    polygons = surface.corner_polygon[surface.triangle_corners]
+    assert (polygons == polygons[:, :1]).all()
+
+
+def test_loose_vertices_are_kept_in_their_places() -> None:
+    obj = make_object("Loose", [(9, 9, 9), (0, 0, 0), (1, 0, 0), (0, 1, 0)], [(1, 2, 3)])
+    found = topology(read_surface(obj).mesh)
+    assert found.is_disc
+    assert found.unused_vertices.tolist() == [0]
+
+
+def test_a_mirrored_object_is_read_as_the_person_sees_it() -> None:
+    obj = make_sheet("Sheet", 5)
+    plain = read_surface(obj)
+    obj.scale.y = -1
+    bpy.context.view_layer.update()
+    mirrored = read_surface(obj)
+    # the mirror image, with the outside still outside: the normals' z keeps its sign while x is negated
+    assert (mirrored.mesh.vertices == plain.mesh.vertices * (-1, 1, 1)).all()
+    assert np.allclose(mirrored.mesh.face_vectors[:, 2], plain.mesh.face_vectors[:, 2])
+    assert (mirrored.corner_vertex[mirrored.triangle_corners] == mirrored.mesh.faces).all()
+
+
+def test_pose_and_size_do_not_matter_but_a_stretch_is_pointed_out() -> None:
+    obj = make_sheet("Sheet", 4)
+    plain = read_surface(obj).fingerprint()
+    obj.location, obj.rotation_euler, obj.scale = (1, 2, 3), (0.1, 0.2, 0.3), (7, 7, 7)
+    bpy.context.view_layer.update()
+    assert read_surface(obj).fingerprint() == plain
+    assert scale_warning(obj) is None
+    obj.scale.z = 8
+    bpy.context.view_layer.update()
+    assert "'Sheet' has different scales" in str(scale_warning(obj))
+
+
+def test_the_fingerprint_tells_every_edit_of_the_shape() -> None:
+    obj = make_sheet("Sheet", 4)
+    seen = {read_surface(obj).fingerprint()}
+    obj.data.vertices[3].co.z += 1e-4
+    seen.add(read_surface(obj).fingerprint())
+    obj.data.flip_normals()
+    seen.add(read_surface(obj).fingerprint())
+    assert len(seen) == 3
+    obj.data.uv_layers.new(name="UV")
+    obj.vertex_groups.new(name="Group")
+    seen.add(read_surface(obj).fingerprint())
+    assert len(seen) == 3
+
+
+@pytest.mark.parametrize(
+    ("vertices", "polygons", "reason"),
+    [
+        ([], [], "'Bad' has no vertices"),
+        ([(0, 0, 0), (1, 0, 0)], [], "'Bad' has no faces"),
+        (
+            [(0, 0, 0), (1, 0, 0), (0, float("nan"), 0)],
+            [(0, 1, 2)],
+            "'Bad' has 1 vertex whose position is not a finite",
+        ),
+    ],
+)
+def test_what_is_no_surface_is_refused_by_name(vertices: list, polygons: list, reason: str) -> None:
+    with pytest.raises(MeshError, match=reason):
+        read_surface(make_object("Bad", vertices, polygons))
