@@ -33,22 +33,27 @@ def voting(
     time_limit: float | None = None,
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
+    ballot: str = "own",
     samples: int | None = None,
     smallest_share: float = 0.4,
     epsilon: float = 0.01,
     seed: int = 0,
 ) -> SearchResult:
-    """Return the sampled transformation whose mutually closest pairs have the most votes.
+    """Return the sampled transformation whose mutually closest pairs have the most votes between them.
 
     Parameters
     ----------
     source, target, radius, metric, weights, z_max, reflect, time_limit, threads, progress
         As in `search`; one thread is used. Only compatible pairs are sampled and voted for, by their weight.
+    ballot : str
+        "shared": a pair has the votes of all transformations that bring it together, which is the table of votes in
+        Möbius voting. "own": only those of the transformation in question, so that the many wrong ones do not outvote
+        the few right ones.
     samples : int, optional
         Transformations drawn for each orientation. Default: ten times the number of compatible pairs, so that on
         average ten start from two right ones if each source point has one right partner.
     smallest_share : float
-        A transformation votes if it has at least this share of the smaller point set in mutually closest pairs.
+        A transformation takes part if it has at least this share of the smaller point set in mutually closest pairs.
     epsilon : float
         Deformation error at which a vote counts half: each vote is epsilon / (epsilon + mean distance of the pairs).
     seed : int
@@ -59,6 +64,8 @@ def voting(
     SearchResult
         Not certified; `nodes` counts sampled transformations.
     """
+    if ballot not in ("own", "shared"):
+        raise ValueError(f"unknown ballot '{ballot}': use 'own' or 'shared'")
     best = incumbent(
         source, target, radius, metric=metric, weights=weights, z_max=z_max, reflect=reflect, time_limit=time_limit,
         threads=threads, progress=progress,
@@ -69,27 +76,28 @@ def voting(
     rng = np.random.default_rng(seed)
     for reflected in best.sides:
         points = best.source(reflected)
-        votes = np.zeros(best.weights.shape)
-        voters: list[tuple[Complexes, Floats, Integers]] = []
+        everyone = np.arange(len(points))
+        table = np.zeros(best.weights.shape)
+        voters: list[tuple[Complexes, Floats, Integers, Floats]] = []
         for first in range(0, count, at_once):
             if not best.goes_on():
                 break
             z, theta = _sampled(best, points, min(at_once, count - first), rng)
             best.nodes += len(z)
             partner, distance = _mutually_closest(best, points, z, theta)
-            paired = partner >= 0
-            number = paired.sum(axis=1)
-            voting = number >= fewest
-            mean = np.where(paired, distance, 0).sum(axis=1)[voting] / number[voting]
-            sample, point = np.nonzero(paired[voting])
-            to = partner[voting][sample, point]
-            vote = (epsilon / (epsilon + mean))[sample] * best.weights[point, to]
-            np.add.at(votes, (point, to), vote)
-            voters.append((z[voting], theta[voting], partner[voting]))
-        if sum(len(z) for z, _, _ in voters):
-            z, theta, partner = (np.concatenate(x) for x in zip(*voters, strict=True))
-            support = np.where(partner >= 0, votes[np.arange(len(points)), partner], 0).sum(axis=1)
-            winner = int(np.argmax(support))
+            number = (partner >= 0).sum(axis=1)
+            enough = number >= fewest
+            z, theta, partner, distance = z[enough], theta[enough], partner[enough], distance[enough]
+            mean = np.where(partner >= 0, distance, 0).sum(axis=1) / number[enough]
+            vote = epsilon / (epsilon + mean)[:, None] * best.weights[everyone, partner]
+            vote = np.where(partner >= 0, vote, 0)
+            np.add.at(table, (everyone, partner), vote)
+            voters.append((z, theta, partner, vote.sum(axis=1)))
+        if sum(len(z) for z, *_ in voters):
+            z, theta, partner, votes = (np.concatenate(x) for x in zip(*voters, strict=True))
+            if ballot == "shared":
+                votes = np.where(partner >= 0, table[everyone, partner], 0).sum(axis=1)
+            winner = int(np.argmax(votes))
             best.offer(Mobius(complex(z[winner]), float(theta[winner])), reflected)
     return best.result()
 

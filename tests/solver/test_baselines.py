@@ -18,6 +18,7 @@ METHODS = {
     "brute_force": (brute_force, ANYWHERE),
     "brute_force on a grid": (lambda *a, **k: brute_force(*a, rotations=360, **k), ANYWHERE),
     "voting": (lambda *a, **k: voting(*a, samples=6000, **k), ANYWHERE),
+    "voting, one table": (lambda *a, **k: voting(*a, samples=6000, ballot="shared", **k), ANYWHERE),
     "graph_matching": (graph_matching, ANYWHERE),
     "gradient_descent": (gradient_descent, MILD),
     "icp": (icp, MILD),
