@@ -13,7 +13,7 @@ from scipy.ndimage import binary_fill_holes, label
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
-from .harmonic import factorised
+from .cholesky import factorised
 from .intrinsic_delaunay import IntrinsicTriangulation
 from .mesh import Booleans, Complexes, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
 

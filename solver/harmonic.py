@@ -9,12 +9,10 @@ and by Tutte's theorem no triangle of that triangulation turns over.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
-from scipy.sparse.linalg import splu
 
+from .cholesky import factorised
 from .circle import angles_of_arcs
 from .intrinsic_delaunay import IntrinsicTriangulation, with_interior, without_chords
 from .laplacian import cotangents
@@ -46,11 +44,6 @@ def riemann_map(surface: IntrinsicTriangulation, boundary: Integers) -> Complexe
     pulled = solve(outer @ np.stack([disc[boundary].real, disc[boundary].imag], axis=1))
     disc[interior] = pulled[:, 0] + 1j * pulled[:, 1]
     return disc[:count]
-
-
-def factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Return the solver, for (n,) and (n, k), of a sparse symmetric positive definite system."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
 
 
 def _dirichlet_systems(surface: IntrinsicTriangulation, boundary: Integers) -> tuple[Integers, csc_array, csr_array]:

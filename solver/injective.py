@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
+from .cholesky import factorised
 from .distortion import signed_areas
-from .harmonic import factorised
 from .laplacian import cotangents
 from .mesh import Booleans, Complexes, Floats, Integers, directed_edges
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
-from .harmonic import factorised
+from .cholesky import factorised
 from .intrinsic_delaunay import IntrinsicTriangulation
 from .laplacian import cotangent_laplacian, cotangents
 from .mesh import Complexes, Floats, Integers

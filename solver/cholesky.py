@@ -1,0 +1,183 @@
+"""Sparse symmetric positive definite systems of meshes: SuperLU for small ones, nested dissection for large ones.
+
+George, "Nested Dissection of a Regular Finite Element Mesh" (1973); Duff and Reid, "The Multifrontal Solution of
+Indefinite Sparse Symmetric Linear Equations" (1983). The graph is cut in two again and again along short curves, level
+sets of hop distances from far-apart vertices. What is left of a part once its inside is eliminated is a small dense
+matrix, so that nearly all of the work is done by BLAS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.linalg import splu
+
+from .mesh import Floats, Integers
+
+LARGE = 80_000
+"""Unknowns from which nested dissection is faster than SuperLU: at 48,000 it takes 1.3 times as long, at 194,000 a
+third (tests/bench/flatten.py)."""
+
+LEAF = 100
+"""Parts of so many unknowns or fewer are eliminated as one dense block."""
+
+
+def factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
+    """Return the solver, for (n,) and (n, k), of a sparse symmetric positive definite system."""
+    if matrix.indptr.size - 1 >= LARGE:
+        return nested_dissection_cholesky(matrix)
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
+
+
+@dataclass(frozen=True, eq=False)
+class _Front:
+    """Columns start to stop of the factor: the inverse of its diagonal block, and the dense block at `rows` below."""
+
+    start: int
+    stop: int
+    rows: Integers
+    inverse: Floats
+    below: Floats
+
+
+def nested_dissection_cholesky(matrix: csc_array) -> Callable[[Floats], Floats]:
+    """Return the solver, for (n,) and (n, k), of a sparse symmetric positive definite system.
+
+    Raises
+    ------
+    ValueError
+        The matrix is not positive definite.
+    """
+    n = matrix.indptr.size - 1
+    part = nested_dissection(csr_array(matrix))
+    depth = np.frexp(part)[1] - 1
+    deepest = int(depth.max())
+    # children before parents: by the end of a part's range of descendants, the deepest first
+    below = deepest - depth
+    key = ((((part + 1) << below) - 1) << 6) + below
+    order = np.argsort(key, kind="stable")
+    bounds = np.flatnonzero(np.diff(key[order], prepend=-1))
+    permuted = csc_array(csc_array(matrix[order])[:, order])
+    fronts = _eliminated(permuted, part[order[bounds]], np.append(bounds, n))
+
+    def solve(right: Floats) -> Floats:
+        x = right[order].reshape(n, -1)
+        for front in fronts:
+            x[front.start : front.stop] = y = front.inverse @ x[front.start : front.stop]
+            x[front.rows] -= front.below @ y
+        for front in reversed(fronts):
+            own = x[front.start : front.stop] - front.below.T @ x[front.rows]
+            x[front.start : front.stop] = front.inverse.T @ own
+        result = np.empty_like(x)
+        result[order] = x
+        return result.reshape(right.shape)
+
+    return solve
+
+
+def nested_dissection(graph: csr_array, leaf: int = LEAF) -> Integers:
+    """Return the part of each vertex, (n,): a number in the binary tree where part p has the children 2 p and 2 p + 1.
+
+    A vertex of an inner part separates the descendants on one side from those on the other: no edge joins them.
+    """
+    n = graph.indptr.size - 1
+    coordinates = _hop_coordinates(graph)
+    edges = graph.tocoo()
+    first, second = edges.row[edges.row < edges.col], edges.col[edges.row < edges.col]
+    part, member = np.ones(n, np.intp), np.arange(n)
+    open_ = np.ones(n, bool)
+    while True:
+        member = member[open_[member]]
+        member = member[np.argsort(part[member], kind="stable")]
+        starts = np.flatnonzero(np.diff(part[member], prepend=0))
+        sizes = np.diff(np.append(starts, len(member)))
+        open_[member[np.repeat(sizes <= leaf, sizes)]] = False
+        if not (sizes > leaf).any():
+            return part
+        member = member[np.repeat(sizes > leaf, sizes)]
+        starts = np.flatnonzero(np.diff(part[member], prepend=0))
+        sizes = np.diff(np.append(starts, len(member)))
+        of_member = np.repeat(np.arange(len(sizes)), sizes)
+
+        here = coordinates[:, member]
+        width = np.maximum.reduceat(here, starts, axis=1) - np.minimum.reduceat(here, starts, axis=1)
+        along = here[np.argmax(width, axis=0)[of_member], np.arange(len(member))]
+        member = member[np.lexsort((along, of_member))]
+        right = np.arange(len(member)) - starts[of_member] >= sizes[of_member] // 2
+        side = 2 * part
+        side[member] += right
+
+        inside = open_[first] & open_[second] & (part[first] == part[second])
+        first, second = first[inside], second[inside]
+        cut = side[first] != side[second]
+        separator = np.where(side[first[cut]] % 2 == 1, first[cut], second[cut])
+        open_[separator] = False
+        part[open_] = side[open_]
+
+
+def _hop_coordinates(graph: csr_array, count: int = 4) -> Floats:
+    """Return distances in edges from far-apart vertices, (count, n); a little of the next one breaks ties."""
+    nearest = _hops(graph, 0)
+    coordinates = np.empty((count, len(nearest)))
+    for k in range(count):
+        coordinates[k] = _hops(graph, int(np.argmax(nearest)))
+        nearest = coordinates[k].copy() if k == 0 else np.minimum(nearest, coordinates[k])
+    return coordinates + 1e-4 * np.roll(coordinates, 1, axis=0)
+
+
+def _hops(graph: csr_array, start: int) -> Floats:
+    """Return the distance in edges of each vertex from one, (n,); n where there is no way."""
+    n = graph.indptr.size - 1
+    order, before = breadth_first_order(graph, start, directed=False)
+    hops = np.full(n, float(n))
+    hops[order] = 1
+    hops[start] = 0
+    before = np.where(before < 0, np.arange(n), before)
+    # each round doubles the length of the way back that is counted
+    while (before[before] != before).any():
+        hops += hops[before]
+        before = before[before]
+    return np.minimum(hops, n)
+
+
+def _eliminated(matrix: csc_array, parts: Integers, bounds: Integers) -> list[_Front]:
+    """Factorise the permuted matrix, part after part."""
+    starts, indices, data = matrix.indptr, matrix.indices.astype(np.intp), matrix.data
+    place = np.empty(len(starts) - 1, np.intp)
+    waiting: dict[int, list[tuple[Integers, Floats]]] = {p: [] for p in parts.tolist()}
+    fronts: list[_Front] = []
+    potrf, trtri = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
+    for p, start, stop in zip(parts.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        span = slice(starts[start], starts[stop])
+        row, value = indices[span], data[span]
+        column = np.repeat(np.arange(stop - start), np.diff(starts[start : stop + 1]))
+        kept = row >= start
+        row, value, column = row[kept], value[kept], column[kept]
+        children = waiting.pop(p)
+        reached = np.concatenate([row, *(rows for rows, _ in children)])
+        rows = np.unique(reached[reached >= stop])
+        k = stop - start
+        place[start:stop] = np.arange(k)
+        place[rows] = k + np.arange(len(rows))
+        front = np.zeros((k + len(rows), k + len(rows)))
+        front[place[row], column] = value
+        for child_rows, update in children:
+            at = place[child_rows]
+            front[at[:, None], at] += update
+        factor, failed = potrf(front[:k, :k], lower=1, clean=1)
+        if failed:
+            raise ValueError("the matrix is not positive definite")
+        inverse, _ = trtri(factor, lower=1)
+        below = front[k:, :k] @ inverse.T
+        if len(rows):
+            parent = p // 2
+            while parent not in waiting:  # a part whose inside has no edge across needs no separator
+                parent //= 2
+            waiting[parent].append((rows, front[k:, k:] - below @ below.T))
+        fronts.append(_Front(start, stop, rows, inverse, below))
+    return fronts
