@@ -248,28 +248,27 @@ class _Search:
         kernels = self.kernels[side]
         inside = left[np.hypot(left[:, X], left[:, Y]) <= self.z_max]
         inside = inside[np.argsort(-inside[:, BOUND], kind="stable")[:CELLS_AT_ONCE]]
-        z = np.unique(inside[:, X] + 1j * inside[:, Y])
+        z = inside[:, X] + 1j * inside[:, Y]
         if len(z) == 0:
             return
-        values, _ = kernels.rotations(z, self.value)
+        values, rotations = kernels.rotations(z, self.value)
         k = int(np.argmax(values))
         if values[k] <= self.value:
             return
-        z, value = complex(z[k]), float(values[k])
+        z, value, theta = complex(z[k]), float(values[k]), float(rotations[k])
         # a pattern search: the value is a step function, so there is no slope to follow
         step = float(inside[:, HALF].max())
         ring: Complexes = np.exp(2j * np.pi * np.arange(8) / 8)
         while step > 1e-4:
             around: Complexes = z + step * (1 - abs(z) ** 2) * ring
             around = around[np.abs(around) <= self.z_max]
-            values, _ = kernels.rotations(around, value)
+            values, rotations = kernels.rotations(around, value, theta)
             k = int(np.argmax(values)) if len(values) else -1
             if k >= 0 and values[k] > value:
-                z, value = complex(around[k]), float(values[k])
+                z, value, theta = complex(around[k]), float(values[k]), float(rotations[k])
             else:
                 step /= 2
-        _, rotation = kernels.rotations(np.array([z]))
-        found = Mobius(z, float(rotation[0]))
+        found = Mobius(z, theta)
         value = self.sides[side].value(found)
         if value > self.value:
             self.value, self.best_side = value, side

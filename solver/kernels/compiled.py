@@ -15,11 +15,17 @@ from ..matching import Matching
 from ..mesh import Complexes, Floats
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 1
+INTERFACE = 4
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
 """Pairs that one thread can hold for the cells it has open, 8 bytes each; cells beyond look at all pairs again."""
+
+NEAR = 1 / 16
+"""Turns that rotations near a given one spread over."""
+
+RINGS, SECTORS = 128, 64
+"""Of the grid of target points, as in kernels.c."""
 
 STACK = 2048
 """Open cells of one subtree at most, as in kernels.c."""
@@ -31,8 +37,8 @@ _I64, _F64, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 class _Problem(ctypes.Structure):
     _fields_ = [
         ("points", _I64),
-        *((name, _POINTER) for name in ("mx", "my", "start", "stop", "inner", "outer", "reach", "b", "e", "turn")),
-        *((name, _POINTER) for name in ("tangent", "wide", "weight")),
+        *((name, _POINTER) for name in ("mx", "my", "start", "stop", "pairs", "inner", "reach", "weight", "raster")),
+        *((name, _POINTER) for name in ("grid", "nearest_ring", "farthest_ring", "ring_wide")),
         ("z_max", _F64),
         ("smallest", _F64),
     ]
@@ -60,9 +66,12 @@ def _checked(loaded: ctypes.CDLL) -> ctypes.CDLL:
     loaded.mobius_images.restype = None
     loaded.mobius_images.argtypes = [_I64, _POINTER, _POINTER, _F64, _F64, _F64, _F64, _F64, *[_POINTER] * 4]
     loaded.mobius_bounds.restype = None
-    loaded.mobius_bounds.argtypes = [_POINTER, _POINTER, _I64, _POINTER, _I64]
+    loaded.mobius_bounds.argtypes = [_POINTER, _POINTER, _I64, ctypes.c_int32, _POINTER, _I64]
+    loaded.mobius_raster_bytes.restype = _I64
+    loaded.mobius_raster.restype = None
+    loaded.mobius_raster.argtypes = [_POINTER]
     loaded.mobius_rotations.restype = None
-    loaded.mobius_rotations.argtypes = [*[_POINTER] * 5, _I64, _F64, _POINTER, _I64]
+    loaded.mobius_rotations.argtypes = [*[_POINTER] * 3, _F64, _F64, *[_POINTER] * 2, _I64, _F64, _POINTER, _I64]
     loaded.mobius_expand.restype = _I64
     loaded.mobius_expand.argtypes = [_POINTER, _POINTER, _I64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]
     return loaded
@@ -83,7 +92,7 @@ class CompiledKernels:
         self._library = loaded
         self.unit = problem.unit
         self.points = len(problem.source)
-        order, start, stop = _rows(problem)
+        order, start, stop, shared = _rows(problem)
         inner, outer = (x[order] for x in reaches(problem))
         tangent, wide = (x[order] for x in tangents(problem))
         # the running maximum along each row: pairs before its first entry >= near cannot reach near
@@ -91,26 +100,29 @@ class CompiledKernels:
         for a, b in set(zip(start.tolist(), stop.tolist(), strict=True)):
             np.maximum.accumulate(outer[a:b], out=reach[a:b])
         centre = problem.centre[order]
+        b, turn = np.abs(centre), np.angle(centre) / (2 * np.pi)
+        wide /= 2 * np.pi
+        widest = np.where(tangent < 0, 1, wide)
         arrays: dict[str, np.ndarray | None] = {
             "mx": problem.source.real,
             "my": problem.source.imag,
             "start": start,
             "stop": stop,
+            "pairs": np.stack([inner, outer, turn, widest, tangent, wide, b, problem.radius[order]], axis=1),
             "inner": inner,
-            "outer": outer,
             "reach": reach,
-            "b": np.abs(centre),
-            "e": problem.radius[order],
-            "turn": np.angle(centre) / (2 * np.pi),
-            "tangent": tangent,
-            "wide": wide / (2 * np.pi),
             "weight": None if problem.unit == 1 else np.round(problem.weight[order] / problem.unit).astype(np.uint32),
         }
+        if shared:
+            arrays["raster"] = np.empty(loaded.mobius_raster_bytes() // 8, np.uint64)
+            arrays |= _grid(b, turn, inner, outer, widest)
         # kept, because the structure holds bare addresses
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
         self._problem = _Problem(points=self.points, z_max=z_max, smallest=smallest, **addresses)
         self._local = threading.local()
+        if shared:
+            loaded.mobius_raster(ctypes.addressof(self._problem))
 
     def _work(self) -> int:
         """Return the address of this thread's working memory."""
@@ -126,20 +138,36 @@ class CompiledKernels:
         self._library.mobius_images(self.points, mx, my, z.real, z.imag, half, kappa.real, kappa.imag, *addresses)
         return alpha, delta, near, far
 
-    def bounds(self, nodes: Floats) -> Floats:
-        """Return `nodes` with their own bound and kappa filled in."""
+    def bounds(self, nodes: Floats, raster: bool = False) -> Floats:
+        """Return `nodes` with their own bound and kappa filled in; `raster`: from the raster, where there is one."""
         nodes = np.array(nodes, dtype=np.float64, order="C")
-        self._library.mobius_bounds(ctypes.addressof(self._problem), nodes.ctypes.data, len(nodes), self._work(), ARENA)
+        self._library.mobius_bounds(
+            ctypes.addressof(self._problem), nodes.ctypes.data, len(nodes), raster, self._work(), ARENA
+        )
         nodes[:, BOUND] *= self.unit
         return nodes
 
-    def rotations(self, z: Complexes, value: float = -1.0) -> tuple[Floats, Floats]:
-        """Return U(z), and a theta that attains it, for each z, (C,); where U(z) <= `value`, any bound that tells."""
+    def rotations(self, z: Complexes, value: float = -1.0, near: float | None = None) -> tuple[Floats, Floats]:
+        """Return, for each z, (C,), what a good theta is worth at most, and that theta.
+
+        Worth 0: not above `value`, or not above the z before it.
+
+        near: a theta in radians; then only rotations close to it are looked at.
+        """
         x, y = np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
         turns, bounds = np.zeros(len(z)), np.zeros(len(z))
-        addresses = [a.ctypes.data for a in (x, y, turns, bounds)]
         self._library.mobius_rotations(
-            ctypes.addressof(self._problem), *addresses, len(z), value / self.unit, self._work(), ARENA
+            ctypes.addressof(self._problem),
+            x.ctypes.data,
+            y.ctypes.data,
+            0.0 if near is None else near / (2 * np.pi) - 0.5 * NEAR,
+            1.0 if near is None else NEAR,
+            turns.ctypes.data,
+            bounds.ctypes.data,
+            len(z),
+            value / self.unit,
+            self._work(),
+            ARENA,
         )
         return bounds * self.unit, turns * (2 * np.pi)
 
@@ -171,18 +199,44 @@ class CompiledKernels:
         return left, spent
 
 
-def _rows(problem: Matching) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return an order of pairs, and where in it each source point's row starts and stops; rows sorted by reach.
+def _rows(problem: Matching) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Return an order of pairs, where in it each source point's row starts and stops, and whether it is one for all.
 
-    If every source point may match every target point, all of them share one row.
+    If every source point may match every target point, all of them share one row, sorted by the sectors of the grid;
+    otherwise each has its own, sorted by reach.
     """
     count = len(problem.source)
-    inner = reaches(problem)[0]
     width = len(problem.point) // count
-    if problem.unit == 1 and (problem.point == np.repeat(np.arange(count), width)[: len(problem.point)]).all():
-        shared = problem.target.reshape(count, width) if width * count == len(problem.target) else None
-        if shared is not None and (shared == shared[0]).all():
-            return np.argsort(inner[:width], kind="stable"), np.zeros(count, np.int64), np.full(count, width, np.int64)
-    order = np.lexsort([inner, problem.point])
+    if problem.unit == 1 and width * count == len(problem.point):
+        targets = problem.target.reshape(count, width)
+        if (problem.point.reshape(count, width) == np.arange(count)[:, None]).all() and (targets == targets[0]).all():
+            centre = problem.centre[:width]
+            order = np.argsort(_sector(np.abs(centre), np.angle(centre) / (2 * np.pi)), kind="stable")
+            return order, np.zeros(count, np.int64), np.full(count, width, np.int64), True
+    order = np.lexsort([reaches(problem)[0], problem.point])
     bounds = np.searchsorted(problem.point, np.arange(count + 1)).astype(np.int64)
-    return order, bounds[:-1].copy(), bounds[1:].copy()
+    return order, bounds[:-1].copy(), bounds[1:].copy(), False
+
+
+def _sector(b: Floats, turn: Floats) -> np.ndarray:
+    """Return the number of the sector of the grid that each target point lies in, ring by ring."""
+    ring = np.minimum((b * RINGS).astype(np.int64), RINGS - 1)
+    return ring * SECTORS + np.minimum(((turn - np.floor(turn)) * SECTORS).astype(np.int64), SECTORS - 1)
+
+
+def _grid(b: Floats, turn: Floats, inner: Floats, outer: Floats, widest: Floats) -> dict[str, np.ndarray]:
+    """Return where each sector's target points begin, and what rings of the grid a ring of images has to look at."""
+    sector = _sector(b, turn)
+    ring = sector // SECTORS
+    wide = np.zeros(RINGS)
+    np.maximum.at(wide, ring, widest)
+    # of the discs that reach out to a ring or beyond, the innermost; of those that reach into it or below, the outermost
+    nearest, farthest = np.full(RINGS, RINGS, np.int64), np.full(RINGS, -1, np.int64)
+    np.minimum.at(nearest, np.clip(np.floor(outer * RINGS), 0, RINGS - 1).astype(np.int64), ring)
+    np.maximum.at(farthest, np.clip(np.floor(inner * RINGS), 0, RINGS - 1).astype(np.int64), ring)
+    return {
+        "grid": np.searchsorted(sector, np.arange(RINGS * SECTORS + 1)).astype(np.int64),
+        "nearest_ring": np.minimum.accumulate(nearest[::-1])[::-1],
+        "farthest_ring": np.maximum.accumulate(farthest),
+        "ring_wide": wide,
+    }

@@ -23,7 +23,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 1
+#define INTERFACE 4
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -32,18 +32,45 @@
 #define CLUSTERS 8     /* windows that the rotations left in one cell are cut into */
 #define FULL 0.75      /* a window wider than this is the full circle */
 
+/* The raster: where the match discs lie, in RINGS rings of the disc and FINE angles, for source points that may all
+   match the same discs. Four fine angles make one stretch; a row holds every fourth angle, so that the stretches of any
+   offset are one row from some bit on (twice the circle, one word to spare). Row (p, q, ring, phase): the rings
+   ring .. ring + 2^p - 1, any of the angles 4 t + phase .. 4 t + phase + 2^q - 1. */
+#define RINGS 512
+#define FINE 2048
+#define PHASES (FINE / BINS)
+#define SPANS 7
+#define SPREADS 10     /* those below FIRST_SPREAD are not needed: a stretch alone takes five fine angles */
+#define FIRST_SPREAD 2
+#define ROW_WORDS (2 * WORDS + 1)
+#define NARROW 0x1p-13 /* half side times width of cells and windows that are bounded by their pairs after the raster */
+#define GRID_RINGS 128
+#define GRID_SECTORS 64
+#define STEADY 0x1p-6  /* half side of cells that take over the common rotation of the cell around them */
+#define COARSE 0x1p-10  /* cells with a smaller half side than this see less in the raster than in lists */
+
 static const double SLACK = 0x1p-42;
 static const double TURN = 0x1.921fb54442d18p+2; /* radians */
 static const double PER_RADIAN = 0x1.45f306dc9c883p-3; /* turns */
+
+typedef struct { /* one cache line */
+    double inner, outer;    /* |b| -+ e, moved outward */
+    double turn, widest;    /* arg b in turns; the widest half-angle it is seen under, rounded up */
+    double tangent, wide;   /* sqrt(b^2 - e^2), and asin(e / b) in turns, rounded up; tangent < 0: see pair_half_width */
+    double b, e;            /* |b| and e */
+} Pair;
 
 typedef struct {
     int64_t points;         /* N1 */
     const double *mx, *my;  /* source, (N1,) */
     const int64_t *start, *stop; /* row of pairs of each source point, sorted by inner */
-    const double *inner, *outer, *reach; /* |b| -+ e moved outward, and the running maximum of outer along its row */
-    const double *b, *e, *turn; /* |b|, e, arg b in turns */
-    const double *tangent, *wide; /* sqrt(b^2 - e^2) and asin(e / b) in turns, rounded up; tangent < 0: see below */
+    const Pair *pairs;
+    const double *inner, *reach; /* of the pairs, and the running maximum of outer along each row */
     const uint32_t *weight; /* NULL: all 1 */
+    uint64_t *raster;       /* NULL: rows differ, or weights do; then grid is NULL too */
+    const int64_t *grid;    /* the one row sorted by ring and sector of b: where each sector begins */
+    const int64_t *nearest_ring, *farthest_ring; /* rings of the grid that hold all discs reaching out of and into a ring */
+    const double *ring_wide; /* the largest `widest` in a ring of the grid */
     double z_max, smallest;
 } Problem;
 
@@ -70,6 +97,7 @@ typedef struct {
     int clusters;
     uint32_t cluster_bound[CLUSTERS];
     double cluster_from[CLUSTERS], cluster_width[CLUSTERS];
+    int first[CLUSTERS], stop[CLUSTERS]; /* the same in stretches; first < 0: across the end */
     double kx, ky;
     int64_t entries, painted;
 } Outcome;
@@ -179,11 +207,11 @@ static void images(int64_t n, const double *restrict mx, const double *restrict 
 }
 
 /* ../bounds.py: widest_half_angle, in turns. The widest circle is that of the tangents' length, if it is in reach. */
-static inline double pair_half_width(const Problem *p, int64_t k, double near, double far, double tolerance) {
-    double rho = near, b = p->b[k], e = p->e[k];
-    if (p->tangent[k] >= 0) {
-        if (far < p->tangent[k]) rho = far;
-        else if (near <= p->tangent[k]) return p->wide[k];
+static inline double pair_half_width(const Pair *pair, double near, double far, double tolerance) {
+    double rho = near, b = pair->b, e = pair->e;
+    if (pair->tangent >= 0) {
+        if (far < pair->tangent) rho = far;
+        else if (near <= pair->tangent) return pair->wide;
     } else if (near < 0x1p-7) return 1; /* the disc holds the centre, or nearly so */
     double q = ((e - (b - rho)) * (e + (b - rho)) + 0x1p-48) / (4 * rho * b) * (1 + 0x1p-48);
     if (!(q < 1)) return 1;
@@ -217,8 +245,7 @@ static inline int any(Mask m) {
 typedef struct {
     Mask plane[PLANES];     /* bit i of each stretch's count */
     Bits pending[8];
-    int waiting, planes;
-    uint32_t everywhere;    /* points that reach every stretch */
+    int waiting;
 } Counter;
 
 static void counter_flush(Counter *c) {
@@ -237,7 +264,6 @@ static void counter_flush(Counter *c) {
         e = c->plane[i] ^ carry;
         c->plane[i] = e;
         carry = d;
-        if (i >= c->planes) c->planes = i + 1;
         if (!any(carry)) break;
     }
     c->waiting = 0;
@@ -266,6 +292,99 @@ static uint32_t counter_most(const Counter *c, Mask among) {
 
 static inline int stretch(double position, int bins) { return position < bins ? (int)position : bins - 1; }
 
+static uint64_t *raster_row(uint64_t *raster, int span, int spread, int ring, int phase) {
+    size_t row = (((size_t)span * (SPREADS - FIRST_SPREAD) + spread - FIRST_SPREAD) * RINGS + ring) * PHASES + phase;
+    return raster + row * ROW_WORDS;
+}
+
+/* Bits `shift` .. of a row, as one mask. */
+static inline Mask row_from(const uint64_t *row, int shift) {
+    Bits low, high;
+    const uint64_t *from = row + (shift >> 6);
+    int bit = shift & 63;
+    for (int i = 0; i < WORDS; i++) { low.word[i] = from[i]; high.word[i] = from[i + 1]; }
+    return bit ? low.all >> bit | high.all << (64 - bit) : low.all;
+}
+
+static int fine_angle(double turns) { return (int)(int64_t)whole(turns * FINE); }
+
+/* Draw the discs of the one row of pairs. */
+EXPORT int64_t mobius_raster_bytes(void) {
+    return (int64_t)sizeof(uint64_t) * SPANS * (SPREADS - FIRST_SPREAD) * RINGS * PHASES * ROW_WORDS;
+}
+
+EXPORT void mobius_raster(const Problem *p) {
+    uint64_t *raster = p->raster;
+    Mask zero = {0};
+    for (int ring = 0; ring < RINGS; ring++) {
+        Bits phase[PHASES], next[PHASES];
+        for (int f = 0; f < PHASES; f++) phase[f].all = zero;
+        double near = ring * (1.0 / RINGS), far = (ring + 1) * (1.0 / RINGS);
+        for (int64_t k = p->start[0]; k < p->stop[0]; k++) {
+            const Pair *pair = p->pairs + k;
+            if (pair->outer < near || pair->inner > far) continue;
+            double half_width = pair_half_width(pair, near, far, 0x1p-14) + SLACK;
+            int first = fine_angle(pair->turn - half_width), last = fine_angle(pair->turn + half_width);
+            if (2 * half_width >= 1 || last - first >= FINE) { first = 0; last = FINE - 1; }
+            for (int i = first; i <= last; i++) {
+                int bit = (i & (FINE - 1)) / PHASES;
+                phase[i & (PHASES - 1)].word[bit >> 6] |= (uint64_t)1 << (bit & 63);
+            }
+        }
+        /* widen by doubling: D_(q+1)(i) = D_q(i) | D_q(i + 2^q) */
+        for (int q = 0; q < SPREADS; q++) {
+            uint64_t twice[PHASES][ROW_WORDS];
+            for (int f = 0; f < PHASES; f++)
+                for (int i = 0; i < ROW_WORDS; i++) twice[f][i] = phase[f].word[i % WORDS];
+            for (int f = 0; f < PHASES; f++) {
+                if (q >= FIRST_SPREAD)
+                    for (int i = 0; i < ROW_WORDS; i++) raster_row(raster, 0, q, ring, f)[i] = twice[f][i];
+                int angle = f + (1 << q);
+                next[f].all = phase[f].all | row_from(twice[angle % PHASES], angle / PHASES % BINS);
+            }
+            for (int f = 0; f < PHASES; f++) phase[f] = next[f];
+        }
+    }
+    for (int span = 1; span < SPANS; span++)
+        for (int q = FIRST_SPREAD; q < SPREADS; q++)
+            for (int ring = 0; ring < RINGS; ring++) {
+                int other = ring + (1 << (span - 1));
+                uint64_t *row = raster_row(raster, span, q, ring, 0);
+                const uint64_t *a = raster_row(raster, span - 1, q, ring, 0);
+                const uint64_t *b = raster_row(raster, span - 1, q, other < RINGS ? other : ring, 0);
+                for (int i = 0; i < PHASES * ROW_WORDS; i++) row[i] = a[i] | b[i];
+            }
+}
+
+/* The stretches of all rotations that bring an image at alpha +- delta, [near, far] onto a disc, at least. */
+static inline Mask raster_mask(const uint64_t *raster, double near, double far, double alpha, double delta) {
+    Mask found = {0}, nowhere = {0};
+    int inside = (int)(near * RINGS), outside = (int)(far * RINGS);
+    if (inside > RINGS - 1) inside = RINGS - 1;
+    if (outside > RINGS - 1) outside = RINGS - 1;
+    int first = 0, count = FINE;
+    if (delta < 0.25) {
+        first = fine_angle(alpha - delta);
+        count = fine_angle(alpha + delta) + PHASES + 1 - first;
+    }
+    int everywhere = count > 2 << (SPREADS - 1);
+    int spread = everywhere ? SPREADS - 1 : 31 - __builtin_clz((unsigned)count);
+    if (spread > SPREADS - 1) spread = SPREADS - 1;
+    int second = first + count - (1 << spread);
+    first &= FINE - 1; second &= FINE - 1;
+    int span = 31 - __builtin_clz((unsigned)(outside - inside + 1));
+    if (span > SPANS - 1) span = SPANS - 1;
+    for (int ring = inside; ; ring += 1 << span) {
+        if (ring > outside - (1 << span) + 1) ring = outside - (1 << span) + 1;
+        const uint64_t *row = raster_row((uint64_t *)raster, span, spread, ring, 0);
+        found |= row_from(row + (first & (PHASES - 1)) * ROW_WORDS, first / PHASES);
+        found |= row_from(row + (second & (PHASES - 1)) * ROW_WORDS, second / PHASES);
+        if (ring + (1 << span) > outside) break;
+    }
+    if (everywhere) return any(found) ? ~nowhere : nowhere;
+    return found;
+}
+
 /* Lay the arc over the window; returns whether it reaches into it. `bits` or `row` is painted. */
 static inline int lay(double centre, double half_width, double from, double width, int bins, double scale,
                       uint64_t *bits, uint32_t *row, uint32_t weight) {
@@ -293,152 +412,231 @@ static inline int lay(double centre, double half_width, double from, double widt
 }
 
 /* Cut the live stretches into windows: more than `gap` dead ones separate two. With gap 0 keep the widest only. */
-static void cluster(const uint8_t *live, const uint32_t *count, int bins, double from, double width, int gap,
-                    Outcome *out) {
-    int cyclic = width >= 1, offset = 0;
-    out->clusters = 0;
-    if (cyclic) { /* begin after the longest gap */
-        int longest = 0, run = 0;
-        for (int i = 0; i < 2 * bins; i++) {
-            run = live[i % bins] ? 0 : run + 1;
-            if (run > longest) { longest = run; offset = (i + 1) % bins; }
-        }
-        if (longest >= bins) return;
-        if (longest < gap) offset = 0;
-    }
-    int first = -1, last = -1;
-    uint32_t best = 0;
-    for (int i = 0; i <= bins; i++) {
-        int bin = i < bins ? (i + offset) % bins : 0, on = i < bins && live[bin];
-        int close = first >= 0 && (i == bins || (on && i - last - 1 > gap && (!gap || out->clusters < CLUSTERS - 1)));
-        if (close) {
-            int n = gap ? out->clusters++ : 0;
-            double wide = (last + 1 - first) * (width / bins);
-            if (gap || !out->clusters || wide > out->cluster_width[0]) {
-                out->clusters = n + 1;
-                out->cluster_bound[n] = best;
-                out->cluster_from[n] = from + (first + offset) * (width / bins);
-                out->cluster_width[n] = wide;
+static void cluster(const uint64_t *live, int bins, double from, double width, int gap, Outcome *out) {
+    int n = 0, start = -1, stop = -1;
+    for (int w = 0; w <= bins / 64; w++) {
+        uint64_t x = w < bins / 64 ? live[w] : 1; /* the last is a sentinel that closes the last window */
+        while (x) {
+            int bit = __builtin_ctzll(x), length = 1;
+            if (w < bins / 64) {
+                uint64_t rest = ~(x >> bit);
+                length = rest ? __builtin_ctzll(rest) : 64;
+                if (length > 64 - bit) length = 64 - bit;
             }
-            first = -1;
-        }
-        if (on) {
-            if (first < 0) { first = i; best = 0; }
-            if (count[bin] > best) best = count[bin];
-            last = i;
+            x = bit + length < 64 ? x >> (bit + length) << (bit + length) : 0;
+            int at = 64 * w + bit;
+            if (start >= 0 && at < bins && at - stop <= gap) { stop = at + length; continue; }
+            if (start >= 0) {
+                if (gap == 0) {
+                    if (n == 0 || stop - start > out->stop[0] - out->first[0]) { out->first[0] = start; out->stop[0] = stop; }
+                    n = 1;
+                } else if (n == CLUSTERS) out->stop[n - 1] = stop;
+                else { out->first[n] = start; out->stop[n++] = stop; }
+            }
+            start = at; stop = at + length;
+            if (w == bins / 64) break;
         }
     }
+    if (n > 1 && width >= 1 && out->first[0] + bins - out->stop[n - 1] <= gap) out->first[0] = out->first[--n] - bins;
+    for (int c = 0; c < n; c++) {
+        out->cluster_from[c] = from + out->first[c] * (width / bins);
+        out->cluster_width[c] = (out->stop[c] - out->first[c]) * (width / bins);
+    }
+    out->clusters = n;
 }
 
-/* Bound Q over a cell and a window. `parents`: the pairs of a cell and window around these, or NULL; `children`: where
-   the pairs that reach into this window go, or NULL. The window is moved and widened from the parent's kappa to ours. */
-static void evaluate(const Problem *p, Work *w, const Node *node, double value, const Entry *parents, int64_t entries,
-                     Entry *children, int64_t room, int gap, Outcome *out) {
+/* What to bound: a cell and a window, over `entries` pairs if not NULL (those of a cell and window around these), over
+   the raster if not NULL (then always of the full circle), or over all pairs. Only stretches worth more than `value`
+   count. `children`: where the pairs that reach into the window go, or NULL. `gap`: see cluster. */
+typedef struct {
+    const Node *node;
+    double value;
+    const uint64_t *raster;
+    const Entry *parents;
+    int64_t entries;
+    Entry *children;
+    int64_t room;
+    int gap;
+} Query;
+
+typedef struct {
+    const Problem *p;
+    const Query *q;
+    Outcome *out;
+    double from, width, middle, reach, scale; /* the window */
+    int bins;
+    Counter counter;
+    uint32_t total[HEAVY_BINS], row[HEAVY_BINS];
+} Laying;
+
+/* Lay the arcs of one source point and some of its pairs. */
+static inline int lay_pairs(Laying *l, uint32_t j, const Entry *list, int64_t low, int64_t high, double near, double far,
+                            double alpha, double delta, uint64_t *bits) {
+    const Problem *p = l->p;
+    Outcome *out = l->out;
+    int touched = 0;
+    for (int64_t k = low; k < high; k++) {
+        int64_t number = list ? list[k].pair : k;
+        const Pair *pair = p->pairs + number;
+        if (pair->outer < near || pair->inner > far) continue;
+        if (l->width < 1) { /* too far from the window, however wide the disc looks */
+            double apart = pair->turn - alpha - l->middle;
+            apart = positive(apart - whole(apart + 0.5));
+            if (apart > delta + pair->widest + l->reach) continue;
+        }
+        double half_width = delta + pair_half_width(pair, near, far, delta / 32);
+        if (!lay(pair->turn - alpha, half_width, l->from, l->width, l->bins, l->scale, bits, l->row,
+                 p->weight ? p->weight[number] : 1)) continue;
+        touched = 1;
+        out->painted++;
+        if (l->q->children) {
+            if (out->entries < l->q->room) l->q->children[out->entries] = (Entry){j, (uint32_t)number};
+            out->entries++;
+        }
+    }
+    return touched;
+}
+
+/* The same for all pairs of a source point that can reach the ring [near, far] and the window. */
+static inline int lay_row(Laying *l, uint32_t j, double near, double far, double alpha, double delta, uint64_t *bits) {
+    const Problem *p = l->p;
+    if (!p->grid) { /* a row of its own, sorted by inner */
+        int64_t low = p->start[j], high = p->stop[j], a = low, b = high;
+        while (a < b) { int64_t mid = (a + b) / 2; if (p->reach[mid] < near) a = mid + 1; else b = mid; }
+        low = a; b = high;
+        while (a < b) { int64_t mid = (a + b) / 2; if (p->inner[mid] <= far) a = mid + 1; else b = mid; }
+        return lay_pairs(l, j, 0, low, a, near, far, alpha, delta, bits);
+    }
+    int inside = (int)(near * GRID_RINGS), outside = (int)(far * GRID_RINGS), touched = 0;
+    inside = (int)p->nearest_ring[inside < GRID_RINGS ? inside : GRID_RINGS - 1];
+    outside = (int)p->farthest_ring[outside < GRID_RINGS ? outside : GRID_RINGS - 1];
+    if (l->width >= 1 || delta > 0.25) {
+        if (inside > outside) return 0;
+        return lay_pairs(l, j, 0, p->grid[inside * GRID_SECTORS], p->grid[(outside + 1) * GRID_SECTORS], near, far, alpha,
+                         delta, bits);
+    }
+    for (int ring = inside; ring <= outside; ring++) {
+        double margin = delta + p->ring_wide[ring] + 0x1p-40, begin = alpha + l->from - margin;
+        double end = begin + l->width + 2 * margin;
+        const int64_t *sectors = p->grid + ring * GRID_SECTORS;
+        if (end - begin > 1 - 2.0 / GRID_SECTORS) {
+            touched |= lay_pairs(l, j, 0, sectors[0], sectors[GRID_SECTORS], near, far, alpha, delta, bits);
+            continue;
+        }
+        int first = (int)whole(begin * GRID_SECTORS), count = (int)whole(end * GRID_SECTORS) - first + 1;
+        first &= GRID_SECTORS - 1;
+        int stop = first + count;
+        touched |= lay_pairs(l, j, 0, sectors[first], sectors[stop < GRID_SECTORS ? stop : GRID_SECTORS], near, far, alpha,
+                             delta, bits);
+        if (stop > GRID_SECTORS)
+            touched |= lay_pairs(l, j, 0, sectors[0], sectors[stop - GRID_SECTORS], near, far, alpha, delta, bits);
+    }
+    return touched;
+}
+
+/* Bound Q over a cell and a window, which is moved and widened from the parent's kappa to ours. */
+static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
+    const Node *node = q->node;
     int64_t n = 0;
     const double *mx = p->mx, *my = p->my;
-    if (parents) {
-        for (int64_t i = 0; i < entries; i++)
-            if (n == 0 || w->active[n - 1] != parents[i].point) {
-                uint32_t j = parents[i].point;
+    if (q->parents) {
+        for (int64_t i = 0; i < q->entries; i++)
+            if (n == 0 || w->active[n - 1] != q->parents[i].point) {
+                uint32_t j = q->parents[i].point;
                 w->mx[n] = p->mx[j]; w->my[n] = p->my[j]; w->active[n++] = j;
             }
         mx = w->mx; my = w->my;
     } else n = p->points;
 
     double kx = node->kx, ky = node->ky;
-    slopes(n, mx, my, node->x, node->y, w->dx, w->dy);
-    common_rotation(n, w->dx, w->dy, &kx, &ky);
-    if (node->half > 0.02) common_rotation(n, w->dx, w->dy, &kx, &ky);
+    if (node->half > STEADY) {
+        slopes(n, mx, my, node->x, node->y, w->dx, w->dy);
+        common_rotation(n, w->dx, w->dy, &kx, &ky);
+        common_rotation(n, w->dx, w->dy, &kx, &ky);
+    }
     out->kx = kx; out->ky = ky;
     images(n, mx, my, node->x, node->y, node->half, kx, ky, w->alpha, w->delta, w->near, w->far);
 
-    double from = node->from, width = node->width;
-    if (width < 1) {
+    Laying l;
+    l.p = p; l.q = q; l.out = out;
+    l.from = node->from; l.width = node->width;
+    if (l.width < 1) {
         double shift = node->half * (positive(kx - node->kx) + positive(ky - node->ky)) * PER_RADIAN + 0x1p-40;
-        from -= shift; width += 2 * shift;
-        if (width > FULL) { from = 0; width = 1; }
+        l.from -= shift; l.width += 2 * shift;
+        if (l.width > FULL) { l.from = 0; l.width = 1; }
     }
-    int bins = p->weight ? HEAVY_BINS : BINS;
-    double scale = bins / width;
-
-    Counter counter;
-    uint32_t total[HEAVY_BINS], row[HEAVY_BINS];
+    Bits window;
     Mask zero = {0};
-    if (p->weight) for (int i = 0; i < HEAVY_BINS; i++) total[i] = 0;
-    else {
-        for (int i = 0; i < PLANES; i++) counter.plane[i] = zero;
-        counter.waiting = 0; counter.planes = 3; counter.everywhere = 0;
+    window.all = ~zero;
+    if (q->raster && l.width < 1) {
+        window.all = zero;
+        lay(l.from + l.width / 2, l.width / 2 + 0x1p-40, 0, 1, BINS, BINS, window.word, 0, 1);
+        l.from = 0; l.width = 1;
     }
-    out->entries = 0; out->painted = 0;
+    l.bins = p->weight ? HEAVY_BINS : BINS;
+    l.scale = l.bins / l.width;
+    l.middle = l.from + l.width / 2; l.reach = l.width / 2 + 0x1p-40;
+    if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] = 0;
+    else {
+        for (int i = 0; i < PLANES; i++) l.counter.plane[i] = zero;
+        l.counter.waiting = 0;
+    }
+    out->entries = 0; out->painted = 0; out->clusters = 0;
     int64_t cursor = 0;
     for (int64_t i = 0; i < n; i++) {
-        uint32_t j = parents ? w->active[i] : (uint32_t)i;
         double near = w->near[i], far = w->far[i], alpha = w->alpha[i], delta = w->delta[i];
-        uint64_t *bits = 0;
-        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) row[k] = 0;
-        else { counter.pending[counter.waiting].all = zero; bits = counter.pending[counter.waiting].word; }
-        int64_t low, high;
-        if (parents) {
-            low = cursor;
-            while (cursor < entries && parents[cursor].point == j) cursor++;
-            high = cursor;
-        } else {
-            int64_t a = p->start[j], b = p->stop[j], c = b;
-            while (a < b) { int64_t mid = (a + b) / 2; if (p->reach[mid] < near) a = mid + 1; else b = mid; }
-            low = a;
-            b = c;
-            while (a < b) { int64_t mid = (a + b) / 2; if (p->inner[mid] <= far) a = mid + 1; else b = mid; }
-            high = a;
+        Bits *bits = &l.counter.pending[l.counter.waiting];
+        if (q->raster) {
+            bits->all = raster_mask(q->raster, near, far, alpha, delta);
+            if (++l.counter.waiting == 8) counter_flush(&l.counter);
+            continue;
         }
-        int touched = 0;
-        for (int64_t k = low; k < high; k++) {
-            int64_t pair = parents ? parents[k].pair : k;
-            if (p->outer[pair] < near || p->inner[pair] > far) continue;
-            double half_width = delta + pair_half_width(p, pair, near, far, delta / 32);
-            if (!lay(p->turn[pair] - alpha, half_width, from, width, bins, scale, bits, row,
-                     p->weight ? p->weight[pair] : 1)) continue;
-            touched = 1;
-            out->painted++;
-            if (children) {
-                if (out->entries < room) { children[out->entries].point = j; children[out->entries].pair = (uint32_t)pair; }
-                out->entries++;
-            }
-        }
+        uint32_t j = q->parents ? w->active[i] : (uint32_t)i;
+        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.row[k] = 0;
+        else bits->all = zero;
+        int touched;
+        if (q->parents) {
+            int64_t low = cursor;
+            while (cursor < q->entries && q->parents[cursor].point == j) cursor++;
+            touched = lay_pairs(&l, j, q->parents, low, cursor, near, far, alpha, delta, p->weight ? 0 : bits->word);
+        } else touched = lay_row(&l, j, near, far, alpha, delta, p->weight ? 0 : bits->word);
         if (!touched) continue;
-        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) total[k] += row[k];
-        else if (++counter.waiting == 8) counter_flush(&counter);
+        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] += l.row[k];
+        else if (++l.counter.waiting == 8) counter_flush(&l.counter);
     }
-    if (children && out->entries > room) out->entries = -1; /* too many to keep */
+    if (q->children && out->entries > q->room) out->entries = -1; /* too many to keep */
 
-    uint8_t live[BINS];
-    uint32_t count[BINS];
     if (p->weight) {
         uint32_t best = 0;
-        for (int k = 0; k < HEAVY_BINS; k++) best = total[k] > best ? total[k] : best;
+        for (int k = 0; k < HEAVY_BINS; k++) best = l.total[k] > best ? l.total[k] : best;
         out->bound = best;
-        out->clusters = 0;
-        if ((double)best <= value) return;
-        for (int k = 0; k < HEAVY_BINS; k++) { live[k] = (double)total[k] > value; count[k] = total[k]; }
-    } else {
-        if (counter.waiting) counter_flush(&counter);
-        Mask above = counter_above(&counter, value < 0 ? -1 : (int64_t)value);
-        out->bound = counter_most(&counter, ~zero);
-        out->clusters = 0;
-        if (!any(above)) return;
-        Bits b; b.all = above;
-        for (int k = 0; k < BINS; k++) {
-            live[k] = b.word[k >> 6] >> (k & 63) & 1;
-            count[k] = out->bound;
-        }
-        if (width >= 1 || out->bound > value + 1) /* otherwise every live count is the largest */
-            for (int k = 0; k < BINS; k++) {
-                if (!live[k]) continue;
-                uint32_t t = 0;
-                for (int i = 0; i < PLANES; i++) { Bits q; q.all = counter.plane[i]; t |= (uint32_t)(q.word[k >> 6] >> (k & 63) & 1) << i; }
-                count[k] = t;
+        if ((double)best <= q->value) return;
+        uint64_t live[HEAVY_BINS / 64] = {0};
+        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > q->value) << (k & 63);
+        cluster(live, HEAVY_BINS, l.from, l.width, q->gap, out);
+        for (int c = 0; c < out->clusters; c++) {
+            out->cluster_bound[c] = 0;
+            for (int k = out->first[c]; k < out->stop[c]; k++) {
+                uint32_t t = l.total[k < 0 ? k + HEAVY_BINS : k];
+                if (t > out->cluster_bound[c]) out->cluster_bound[c] = t;
             }
+        }
+        return;
     }
-    cluster(live, count, bins, from, width, gap, out);
+    if (l.counter.waiting) counter_flush(&l.counter);
+    Bits above;
+    above.all = window.all & counter_above(&l.counter, q->value < 0 ? -1 : (int64_t)q->value);
+    out->bound = counter_most(&l.counter, window.all);
+    if (!any(above.all)) return;
+    cluster(above.word, BINS, l.from, l.width, q->gap, out);
+    for (int c = 0; c < out->clusters; c++) {
+        Bits among;
+        among.all = zero;
+        int first = out->first[c], stop = out->stop[c];
+        if (first < 0) { paint(among.word, first + BINS, BINS - 1); first = 0; }
+        paint(among.word, first, stop - 1);
+        out->cluster_bound[c] = counter_most(&l.counter, among.all & above.all);
+    }
 }
 
 static int64_t doubles_of(int64_t points) { return 8 * points; }
@@ -489,34 +687,45 @@ EXPORT void mobius_images(int64_t n, const double *mx, const double *my, double 
 }
 
 /* The bound of each node (cell and window), written into it; the node's kappa becomes that of the bound. */
-EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, void *memory, int64_t arena) {
+EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, int32_t raster, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
         Outcome out;
-        evaluate(p, &w, &nodes[i], 0x1p40, 0, 0, 0, 0, 0, &out);
+        Query query = {&nodes[i], 0x1p40, raster ? p->raster : 0, 0, 0, 0, 0, 1};
+        evaluate(p, &w, &query, &out);
         nodes[i].bound = out.bound; nodes[i].kx = out.kx; nodes[i].ky = out.ky;
     }
 }
 
-/* U(z) from above, to rounding, and a rotation, in turns, of the best stretch, for each z: by looking ever closer at it.
-   Given up early where U(z) is not above `value`. */
-EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, double *turns, double *bounds,
-                             int64_t n, double value, void *memory, int64_t arena) {
+/* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretch,
+   from a window on. Worth 0: not above `value`, or not above the z before it. */
+EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, double from, double width,
+                             double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
-        Node node = {x[i], y[i], 0, 0, 0, 0, 1, 0};
+        Node node = {x[i], y[i], 0, 0, 0, from, width, 0};
         Outcome out;
         turns[i] = 0;
         double best = 0x1p40;
+        Query query = {&node, best - 1, p->raster, 0, 0, 0, 0, 0};
+        if (p->raster && width >= 1) {
+            evaluate(p, &w, &query, &out);
+            bounds[i] = 0;
+            if (out.bound <= value) continue;
+        }
+        query.raster = 0;
         for (int zoom = 0; zoom < 5; zoom++) {
-            evaluate(p, &w, &node, best - 1, 0, 0, 0, 0, 0, &out);
+            evaluate(p, &w, &query, &out);
             bounds[i] = best = out.bound;
-            if (best <= value) break;
-            if (!out.clusters) evaluate(p, &w, &node, best - 1, 0, 0, 0, 0, 0, &out);
+            if (best <= value || best == 0) break;
+            query.value = best - 1;
+            if (!out.clusters) evaluate(p, &w, &query, &out);
             turns[i] = out.cluster_from[0] + 0.5 * out.cluster_width[0];
-            if (best == 0 || out.cluster_width[0] > FULL) break;
+            if (out.cluster_width[0] > FULL) break;
             node.from = out.cluster_from[0]; node.width = out.cluster_width[0];
         }
+        if (best > value) value = best;
+        else bounds[i] = 0;
     }
 }
 
@@ -537,7 +746,7 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
         while (depth) {
             Open open = stack[--depth];
             if (open.node.bound <= value) continue;
-            if (open.node.half <= p->smallest || spent >= budget || depth + 4 * CLUSTERS > STACK) {
+            if (open.node.half <= p->smallest || spent >= budget || depth + 4 * CLUSTERS * CLUSTERS > STACK) {
                 left[found++] = open.node;
                 continue;
             }
@@ -551,23 +760,42 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                 double ox = most(positive(child.x) - half, 0), oy = most(positive(child.y) - half, 0);
                 if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) continue;
                 if (child.width < 1) child.from -= (child.kx * sy + child.ky * sx) * PER_RADIAN;
-                int windowed = child.width < 1;
-                Outcome out;
-                evaluate(p, &w, &child, value, open.entries < 0 ? 0 : w.arena + open.offset, open.entries,
-                         windowed ? w.arena + top : 0, windowed ? w.room - top : 0,
-                         p->weight ? HEAVY_BINS / 16 : BINS / 16, &out);
-                bounds++; spent++; painted += out.painted; inherited += open.entries >= 0;
-                int64_t kept = windowed ? out.entries : -1;
-                for (int k = 0; k < out.clusters; k++) {
-                    Open *next = &stack[depth++];
-                    next->node = child;
-                    next->node.kx = out.kx; next->node.ky = out.ky;
-                    next->node.bound = least((double)out.cluster_bound[k], open.node.bound);
-                    next->node.from = out.cluster_from[k]; next->node.width = out.cluster_width[k];
-                    if (next->node.width > FULL) { next->node.from = 0; next->node.width = 1; }
-                    next->offset = top; next->entries = kept;
+                const Entry *list = open.entries < 0 ? 0 : w.arena + open.offset;
+                int gap = p->weight ? HEAVY_BINS / 16 : BINS / 16, raster = p->raster && half >= COARSE && !list;
+                Outcome coarse, out;
+                if (raster) {
+                    Query query = {&child, value, p->raster, 0, 0, 0, 0, gap};
+                    evaluate(p, &w, &query, &coarse);
+                    bounds++; spent++;
+                    child.kx = coarse.kx; child.ky = coarse.ky;
+                } else {
+                    coarse.clusters = 1; coarse.cluster_bound[0] = UINT32_MAX;
+                    coarse.cluster_from[0] = child.from; coarse.cluster_width[0] = child.width;
                 }
-                if (out.clusters && kept > 0) top += kept;
+                for (int c = 0; c < coarse.clusters; c++) {
+                    child.from = coarse.cluster_from[c]; child.width = coarse.cluster_width[c];
+                    child.bound = least(coarse.cluster_bound[c], open.node.bound);
+                    if (child.width > FULL) { child.from = 0; child.width = 1; }
+                    if (raster && child.width * half > NARROW) {
+                        stack[depth++] = (Open){child, 0, -1, 0};
+                        continue;
+                    }
+                    Entry *children = child.width < 1 ? w.arena + top : 0;
+                    Query query = {&child, value, 0, list, open.entries, children, w.room - top, gap};
+                    evaluate(p, &w, &query, &out);
+                    bounds++; spent++; painted += out.painted; inherited += list != 0;
+                    int64_t kept = children ? out.entries : -1;
+                    for (int k = 0; k < out.clusters; k++) {
+                        Open *next = &stack[depth++];
+                        next->node = child;
+                        next->node.kx = out.kx; next->node.ky = out.ky;
+                        next->node.bound = least(out.cluster_bound[k], child.bound);
+                        next->node.from = out.cluster_from[k]; next->node.width = out.cluster_width[k];
+                        if (next->node.width > FULL) { next->node.from = 0; next->node.width = 1; }
+                        next->offset = top; next->entries = kept;
+                    }
+                    if (out.clusters && kept > 0) top += kept;
+                }
             }
             /* the most promising last, that is next; the lists stay in the arena until all of these are done */
             for (int64_t i = base + 1; i < depth; i++) {

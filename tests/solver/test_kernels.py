@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from instances import disc_points, planted, random_problem
+from instances import disc_points, nasty_points, planted, random_problem
 from test_bounds import points_of_cells, random_cells
 
 from solver import Mobius, search
@@ -98,6 +98,24 @@ def test_bound_of_a_cell_exceeds_the_value_at_every_point_of_it(seed):
     assert (best_rotations(problem, z[inside])[0] <= bounds[inside]).all()
 
 
+@settings(max_examples=40, deadline=None)
+@given(SEEDS)
+def test_the_raster_rounds_outward(seed):
+    rng = np.random.default_rng(seed)
+    n1, n2 = rng.integers(1, 30, 2)
+    metric = str(rng.choice(["hyperbolic", "euclidean"]))
+    radius = 10.0 ** rng.uniform(-3, -0.3, n2)
+    problem = matching(nasty_points(rng, n1), disc_points(rng, n2, 0.999), radius, metric=metric)
+    kernels = CompiledKernels(problem, 0.9, SMALLEST_CELL)
+    centre, half = random_cells(rng, problem, 60)
+    nodes = cells_as_nodes(centre, half)
+    exact, coarse = kernels.bounds(nodes)[:, BOUND], kernels.bounds(nodes, raster=True)[:, BOUND]
+    assert (exact <= coarse).all()
+    assert coarse.mean() <= exact.mean() + 0.5 * n1
+    z, inside = points_of_cells(rng, centre, half)
+    assert (best_rotations(problem, z[inside])[0] <= coarse[inside]).all()
+
+
 @settings(max_examples=150, deadline=None)
 @given(SEEDS)
 def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(seed):
@@ -124,12 +142,16 @@ def test_best_rotations_are_the_same(seed):
     rng = np.random.default_rng(seed)
     problem = random_problem(rng)
     z = disc_points(rng, 12, 0.98)
-    values, rotations = CompiledKernels(problem, 0.99, SMALLEST_CELL).rotations(z)
+    kernels = CompiledKernels(problem, 0.99, SMALLEST_CELL)
+    values, rotations = (
+        np.concatenate(x) for x in zip(*(kernels.rotations(z[k : k + 1]) for k in range(12)), strict=True)
+    )
     exact = best_rotations(problem, z)[0]
-    assert (exact <= values).all()
-    reached = [problem.value(Mobius(x, t)) for x, t in zip(z.tolist(), rotations.tolist(), strict=True)]
-    # the best stretch may be narrower than the slack: nasty points touch
-    assert np.mean(np.array(reached) == exact) > 0.7
+    reached = np.array([problem.value(Mobius(x, t)) for x, t in zip(z.tolist(), rotations.tolist(), strict=True)])
+    assert (reached <= values).all()
+    assert (reached <= exact).all()
+    # of several stretches that look best the widest is taken, which need not hold the best rotation
+    assert np.mean(reached == exact) >= 0.5
 
 
 @settings(max_examples=60, deadline=None)
