@@ -7,13 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from .descriptors import diffused_mean_curvature, standardised
 from .flatten import Flattening, flatten
-from .locate import TriangulatedDisc
 from .mesh import Complexes, Floats, Integers, TriangleMesh
 from .mobius import Mobius, hyperbolic_distance
+from .refine import refined
 from .sampling import extrema, farthest_points
 from .search import SearchProgress, SearchResult, search
 
@@ -169,7 +168,7 @@ def align(
     mobius = found.mobius
     if settings.refine != "none":
         clock.begin("refine", "Refining", 0.9)
-        mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings)
+        mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings.descriptor_scale)
     clock.end()
     if not found.certified:
         share = 100 * found.gap / max(found.upper_bound, 1e-300)
@@ -204,50 +203,6 @@ def covering_radius(points: Complexes) -> Floats:
     """
     distance = hyperbolic_distance(points[:, None], points)
     return np.clip(np.sort(distance, axis=1)[:, min(2, len(points) - 1)], 1e-6, 0.5)
-
-
-def refined(
-    mobius: Mobius,
-    source: Flattening,
-    target: Flattening,
-    source_descriptors: Floats,
-    target_descriptors: Floats,
-    settings: AlignSettings,
-    most_vertices: int = 3000,
-) -> Mobius:
-    """Return the transformation near `mobius` at which the descriptors of all vertices agree best.
-
-    Maximises the area-weighted sum of exp(-|d_j - d(f(m_j))|^2 / (2 scale^2)), d on the target by linear interpolation,
-    over z and theta of a small transformation applied first (Nelder and Mead). Of larger meshes every so many-th vertex
-    is used.
-    """
-    used = np.flatnonzero(np.isfinite(source.disc.real))
-    used = used[:: max(1, len(used) // most_vertices)]
-    points, expected = source.disc[used], source_descriptors[used]
-    weights = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
-    disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
-
-    def disagreement(step: Floats) -> float:
-        if np.hypot(step[0], step[1]) >= 0.5:
-            return 0.0
-        face, barycentric = disc.locate((mobius @ _small(step))(points))
-        there = np.einsum("qk,qkd->qd", barycentric, target_descriptors[target.mesh.faces[face]])
-        square = ((there - expected) ** 2).sum(axis=1)
-        return -float(weights @ np.exp(-square / (2 * settings.descriptor_scale**2)))
-
-    corners = 0.03 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 2]], dtype=float)
-    found = minimize(
-        disagreement,
-        np.zeros(3),
-        method="Nelder-Mead",
-        options={"initial_simplex": corners, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 200},
-    )
-    return mobius @ _small(found.x) if found.fun < disagreement(np.zeros(3)) else mobius
-
-
-def _small(step: Floats) -> Mobius:
-    """Return the transformation with z = step[0] + i step[1] and theta = step[2]."""
-    return Mobius(complex(step[0], step[1]), float(step[2]))
 
 
 def _interior(flattening: Flattening) -> np.ndarray:

@@ -84,7 +84,7 @@ def test_the_order_of_vertices_and_faces_changes_nothing(sheet, found):
 
 def test_there_and_back(sheet, found):
     """align(A, B) and align(B, A) are inverse to within the sampling."""
-    alignment, vertex = found
+    alignment, _ = found
     back = align(alignment.target.mesh, sheet, SMALL)
     round_trip = (back.mobius @ alignment.mobius)(alignment.source.disc)
     assert np.abs(round_trip - alignment.source.disc).max() < 0.03
@@ -108,7 +108,7 @@ def test_a_reflected_copy_is_found_and_named(sheet):
 
 def test_a_mirror_symmetric_surface_is_not_reflected_and_the_tie_is_said():
     sheet = bumps(900, seed=1)
-    x, y, z = sheet.vertices.T
+    x, y = sheet.vertices[:, :2].T
     even = TriangleMesh(np.column_stack([x, y, 0.2 * np.exp(-8 * (x - 0.4) ** 2 - 8 * y**2)]), sheet.faces)
     alignment = align(even, posed(even, 11), AlignSettings(samples=30, targets=200, reflect="auto"))
     assert not alignment.mobius.reflected
