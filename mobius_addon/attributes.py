@@ -221,8 +221,9 @@ def _new_group(obj: bpy.types.Object, name: str, weights: npt.NDArray[np.float32
 def numbered(name: str) -> Iterator[str]:
     """Yield a name and then Blender's numbered forms of it."""
     yield name
+    stem = name.encode()[:59].decode(errors="ignore")  # Blender cuts names to 63 bytes
     for number in count(1):
-        yield f"{name[:59]}.{number:03d}"
+        yield f"{stem}.{number:03d}"
 
 
 @dataclass(frozen=True)

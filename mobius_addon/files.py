@@ -230,6 +230,8 @@ def import_meshes(path: Path) -> list[Imported]:
     form = format_of(path)
     if not path.is_file():
         raise Unreadable(f"'{path}' is not a file" if path.exists() else f"there is no file '{path}'")
+    if path.stat().st_size == 0:
+        raise Unreadable(f"'{path}' is empty")
     # set the scene's names aside, so that imported objects keep theirs
     before = {obj: obj.name for obj in bpy.data.objects}
     for number, obj in enumerate(before):

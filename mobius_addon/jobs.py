@@ -64,11 +64,11 @@ class Job:
         return not self._thread.is_alive()
 
 
-def describe_progress(progress: Progress) -> str:
-    """Return one line about where the work is; in the search, what is proved so far."""
+def describe_proof(progress: Progress) -> str:
+    """Return what the search has proved so far, or nothing outside the search."""
     if progress.value is None or progress.upper_bound is None:
-        return progress.stage
-    return f"{progress.stage}: matched {progress.value:.2f}, proven bound {progress.upper_bound:.2f}"
+        return ""
+    return f"matched {progress.value:.1f} of at most {progress.upper_bound:.1f}"
 
 
 class JobOperator:
@@ -126,15 +126,18 @@ class JobOperator:
         """Follow the worker; everything but ESC passes through."""
         if event.type == "ESC" and event.value == "PRESS":
             self._job.cancel()
-            context.window_manager.mobius_job.show("Stopping", 0.0)
+            context.window_manager.mobius_job.show("Stopping", "", 0.0)
+            _redraw_sidebars(context)
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL", "PASS_THROUGH"}
         if not self._job.done:
             if self._job.progress is not None and not self._job.cancelled:
-                text = describe_progress(self._job.progress)
-                if context.window_manager.mobius_job.show(text, self._job.progress.fraction):
-                    context.workspace.status_text_set(f"{self.job_title}: {text} (ESC: stop)")
+                progress = self._job.progress
+                proved = describe_proof(progress)
+                if context.window_manager.mobius_job.show(progress.stage, proved, progress.fraction):
+                    now = ": ".join(filter(None, (self.job_title, progress.stage, proved)))
+                    context.workspace.status_text_set(f"{now} (ESC: stop)")
                     _redraw_sidebars(context)
             return {"RUNNING_MODAL", "PASS_THROUGH"}
         self._close(context)

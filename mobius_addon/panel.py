@@ -36,6 +36,8 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         job = context.window_manager.mobius_job
         if job.running:
             layout.progress(factor=job.fraction, text=job.text)
+            if job.proved:
+                layout.label(text=job.proved)
             layout.label(text="ESC stops", icon="INFO")
         else:
             operator = layout.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
@@ -75,14 +77,16 @@ def _draw_line(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.
         return
     kept = preferences(context)
     if kept is not None and not kept.check_while_drawing:
-        line = topology_cache.Line(f"{len(obj.data.vertices):,} vertices", None)
+        line = topology_cache.Line((f"{len(obj.data.vertices):,} vertices",), None)
     else:
         line = topology_cache.line_of(obj)
     icon = {True: "CHECKMARK", False: "ERROR", None: "QUESTION"}[line.is_disc]
     row = layout.row(align=True)
-    row.label(text=line.text, icon=icon)
+    row.label(text=line.rows[0], icon=icon)
     if not line.is_disc:
         row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF").object_name = obj.name
+    for text in line.rows[1:]:
+        layout.label(text=text, icon="BLANK1")
 
 
 def _draw_result(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

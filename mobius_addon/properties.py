@@ -5,10 +5,11 @@ import bpy
 
 from . import topology_cache
 from .options import AlignOptions, TransferOptions
+from .usable import is_in_scene
 
 
 def _is_choosable(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH" and settings.id_data.objects.get(obj.name) == obj
+    return obj.type == "MESH" and is_in_scene(obj, settings.id_data)
 
 
 class MobiusSettings(AlignOptions, TransferOptions, bpy.types.PropertyGroup):
@@ -49,18 +50,19 @@ class MobiusJob(bpy.types.PropertyGroup):
 
     title: bpy.props.StringProperty()
     text: bpy.props.StringProperty()
+    proved: bpy.props.StringProperty()
     fraction: bpy.props.FloatProperty()
     running: bpy.props.BoolProperty()
 
     def start(self, title: str) -> None:
         """Begin to show work."""
-        self.title, self.text, self.fraction, self.running = title, "Starting", 0.0, True
+        self.title, self.text, self.proved, self.fraction, self.running = title, "Starting", "", 0.0, True
 
-    def show(self, text: str, fraction: float) -> bool:
-        """Show where the work is and return whether that is news."""
-        if (text, round(fraction, 2)) == (self.text, round(self.fraction, 2)):
+    def show(self, text: str, proved: str, fraction: float) -> bool:
+        """Show where the work is and what is proved so far, and return whether that is news."""
+        if (text, proved, round(fraction, 2)) == (self.text, self.proved, round(self.fraction, 2)):
             return False
-        self.text, self.fraction = text, fraction
+        self.text, self.proved, self.fraction = text, proved, fraction
         return True
 
     def stop(self) -> None:

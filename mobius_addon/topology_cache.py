@@ -19,13 +19,13 @@ class Line:
 
     Attributes
     ----------
-    text : str
-        As `Topology.describe`, or why the mesh cannot be read.
+    rows : tuple of str
+        Short texts, for one row each: what it is, or what is in the way and then what to do about it.
     is_disc : bool or None
         None if it is not known yet.
     """
 
-    text: str
+    rows: tuple[str, ...]
     is_disc: bool | None
 
 
@@ -38,17 +38,26 @@ def line_of(obj: bpy.types.Object) -> Line:
     key = _key(obj)
     if key not in _lines:
         if len(obj.data.polygons) > MAX_POLYGONS:
-            return Line(f"{len(obj.data.vertices):,} vertices, not checked yet", None)
+            return Line((f"{len(obj.data.vertices):,} vertices, not checked yet",), None)
         try:
             store(obj, topology(read_surface(obj).mesh))
         except MeshError as error:
-            _lines[key] = Line(str(error).removeprefix(f"'{obj.name}' "), False)
+            _lines[key] = Line(_rows(str(error).removeprefix(f"'{obj.name}' ")), False)
     return _lines[key]
 
 
 def store(obj: bpy.types.Object, found: Topology) -> None:
     """Keep what has been found about an object's mesh."""
-    _lines[_key(obj)] = Line(found.describe(), found.is_disc)
+    problems = found.problems()
+    if problems:
+        _lines[_key(obj)] = Line(tuple(row for problem in problems for row in _rows(problem)), False)
+    else:
+        _lines[_key(obj)] = Line((f"disc, {found.vertices:,} vertices",), True)
+
+
+def _rows(problem: str) -> tuple[str, ...]:
+    """Split what is wrong from what to do about it."""
+    return tuple(problem.split(": ", 1))
 
 
 def _key(obj: bpy.types.Object) -> tuple[int, ...]:

@@ -23,13 +23,19 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
         return f"Choose a {role} first"
     if obj.type != "MESH":
         return f"'{obj.name}' is no mesh: convert it (Object > Convert > Mesh) or choose another {role}"
-    if scene.objects.get(obj.name) != obj:
+    if not is_in_scene(obj, scene):
         return f"'{obj.name}' is not in this scene: choose another {role}"
     if obj.mode != "OBJECT":
         return f"'{obj.name}' is in {obj.mode.replace('_', ' ').title()} Mode: switch to Object Mode first"
     if writes and not (obj.is_editable and obj.data.is_editable):
         return f"'{obj.name}' is linked from another file: make it local first (Object > Relations > Make Local)"
     return None
+
+
+def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Return whether an object is in a scene; one that was deleted while something still points to it is not."""
+    # by name first, which is fast; a linked and a local object can have one name
+    return scene.objects.get(obj.name) == obj or any(other == obj for other in scene.objects)
 
 
 def why_not_pair(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes_source: bool) -> str | None:

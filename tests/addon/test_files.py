@@ -88,7 +88,7 @@ def test_an_object_in_another_format_than_blend_can_be_named_too(tmp_path: Path)
     [
         ("gone.obj", None, "there is no file"),
         ("text.txt", "hello", "has an ending that is not known: use one of .blend .obj"),
-        ("empty.obj", "", "holds no mesh"),
+        ("empty.obj", "", "is empty"),
         ("words.obj", "these are only words\n", "holds no mesh"),
         ("words.ply", "these are only words\n", "could not be read: PLY Importer: words: Invalid PLY header"),
         ("words.glb", "these are only words\n", "could not be read: "),
