@@ -179,8 +179,9 @@ class _Search:
     ) -> SearchResult:
         """Split cells, best bound first, until none can hold a better transformation or time is up."""
         started = reported = time.perf_counter()
-        cancelled, budget = False, 4
-        # bounds per open cell and round: growing, as the value in hand is poor at first, to a twentieth of a second
+        cancelled, rounds = False, 0
+        # bounds per open cell and round: few at first, best bound first, as a good value is found by looking everywhere;
+        # more later, so that a long search does not spend its time here
         most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
             while self.upper_bound > max(self.value, self.finished_bound):
@@ -192,8 +193,8 @@ class _Search:
                     if progress(SearchProgress(self.value, self.upper_bound, self.nodes, now - started)) is False:
                         cancelled = True
                         break
-                self._round(budget, pool)
-                budget = min(2 * budget, most)
+                self._round(min(8 << rounds // 32, most), pool)
+                rounds += 1
         problem = self.sides[self.best_side]
         plain = Mobius(self.best.z, self.best.theta)
         upper = self.upper_bound

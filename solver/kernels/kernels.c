@@ -297,12 +297,11 @@ static uint64_t *raster_row(uint64_t *raster, int span, int spread, int ring, in
     return raster + row * ROW_WORDS;
 }
 
-/* Bits `shift` .. of a row, as one mask. */
-static inline Mask row_from(const uint64_t *row, int shift) {
+/* The union of two rows from word `from`, bit `bit` on. */
+static inline Mask rows_from(const uint64_t *a, const uint64_t *b, int from, int bit) {
     Bits low, high;
-    const uint64_t *from = row + (shift >> 6);
-    int bit = shift & 63;
-    for (int i = 0; i < WORDS; i++) { low.word[i] = from[i]; high.word[i] = from[i + 1]; }
+    a += from; b += from;
+    for (int i = 0; i < WORDS; i++) { low.word[i] = a[i] | b[i]; high.word[i] = a[i + 1] | b[i + 1]; }
     return bit ? low.all >> bit | high.all << (64 - bit) : low.all;
 }
 
@@ -340,7 +339,9 @@ EXPORT void mobius_raster(const Problem *p) {
                 if (q >= FIRST_SPREAD)
                     for (int i = 0; i < ROW_WORDS; i++) raster_row(raster, 0, q, ring, f)[i] = twice[f][i];
                 int angle = f + (1 << q);
-                next[f].all = phase[f].all | row_from(twice[angle % PHASES], angle / PHASES % BINS);
+                const uint64_t *row = twice[angle % PHASES];
+                int shift = angle / PHASES % BINS;
+                next[f].all = phase[f].all | rows_from(row, row, shift >> 6, shift & 63);
             }
             for (int f = 0; f < PHASES; f++) phase[f] = next[f];
         }
@@ -374,12 +375,13 @@ static inline Mask raster_mask(const uint64_t *raster, double near, double far, 
     first &= FINE - 1; second &= FINE - 1;
     int span = 31 - __builtin_clz((unsigned)(outside - inside + 1));
     if (span > SPANS - 1) span = SPANS - 1;
-    for (int ring = inside; ; ring += 1 << span) {
-        if (ring > outside - (1 << span) + 1) ring = outside - (1 << span) + 1;
-        const uint64_t *row = raster_row((uint64_t *)raster, span, spread, ring, 0);
-        found |= row_from(row + (first & (PHASES - 1)) * ROW_WORDS, first / PHASES);
-        found |= row_from(row + (second & (PHASES - 1)) * ROW_WORDS, second / PHASES);
-        if (ring + (1 << span) > outside) break;
+    /* two rows overlap to cover the rings, unless there are very many */
+    for (int ring = inside; ring <= outside; ring += 2 << span) {
+        int other = ring + (1 << span), last = outside - (1 << span) + 1;
+        const uint64_t *a = raster_row((uint64_t *)raster, span, spread, ring < last ? ring : last, 0);
+        const uint64_t *b = raster_row((uint64_t *)raster, span, spread, other < last ? other : last, 0);
+        found |= rows_from(a, b, (first & (PHASES - 1)) * ROW_WORDS + first / (64 * PHASES), first / PHASES & 63);
+        found |= rows_from(a, b, (second & (PHASES - 1)) * ROW_WORDS + second / (64 * PHASES), second / PHASES & 63);
     }
     if (everywhere) return any(found) ? ~nowhere : nowhere;
     return found;
