@@ -180,8 +180,8 @@ class _Search:
         """Split cells, best bound first, until none can hold a better transformation or time is up."""
         started = reported = time.perf_counter()
         cancelled, rounds = False, 0
-        # bounds per open cell and round: few at first, best bound first, as a good value is found by looking everywhere;
-        # more later, so that a long search does not spend its time here
+        # bounds per open cell and round: few at first, as the best bounds lead to a good value; more later, so that a
+        # long search does not spend its time here
         most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
             while self.upper_bound > max(self.value, self.finished_bound):

@@ -230,7 +230,7 @@ def _grid(b: Floats, turn: Floats, inner: Floats, outer: Floats, widest: Floats)
     ring = sector // SECTORS
     wide = np.zeros(RINGS)
     np.maximum.at(wide, ring, widest)
-    # of the discs that reach out to a ring or beyond, the innermost; of those that reach into it or below, the outermost
+    # of the discs that reach out to a ring or beyond the innermost, of those that reach into it or below the outermost
     nearest, farthest = np.full(RINGS, RINGS, np.int64), np.full(RINGS, -1, np.int64)
     np.minimum.at(nearest, np.clip(np.floor(outer * RINGS), 0, RINGS - 1).astype(np.int64), ring)
     np.maximum.at(farthest, np.clip(np.floor(inner * RINGS), 0, RINGS - 1).astype(np.int64), ring)

@@ -230,7 +230,17 @@ static inline void paint(uint64_t *word, int low, int high) {
     word[last] |= tail;
 }
 
-static inline void paint_heavy(uint32_t *row, int low, int high, uint32_t weight) {
+typedef struct {
+    uint32_t stretch[HEAVY_BINS], whole; /* the largest weight on each stretch, and on all of them */
+    int clean;                           /* nothing is laid on single stretches */
+} Row;
+
+static inline void paint_heavy(Row *into, int low, int high, uint32_t weight) {
+    uint32_t *row = into->stretch;
+    if (weight <= into->whole) return;
+    if (low == 0 && high == HEAVY_BINS - 1) { into->whole = weight; return; }
+    if (into->clean) for (int i = 0; i < HEAVY_BINS; i++) row[i] = 0;
+    into->clean = 0;
     for (int i = low; i <= high; i++) row[i] = row[i] > weight ? row[i] : weight;
 }
 
@@ -389,7 +399,7 @@ static inline Mask raster_mask(const uint64_t *raster, double near, double far, 
 
 /* Lay the arc over the window; returns whether it reaches into it. `bits` or `row` is painted. */
 static inline int lay(double centre, double half_width, double from, double width, int bins, double scale,
-                      uint64_t *bits, uint32_t *row, uint32_t weight) {
+                      uint64_t *bits, Row *row, uint32_t weight) {
     int low[2], high[2], pieces = 0;
     if (2 * half_width >= 1) { low[0] = 0; high[0] = bins - 1; pieces = 1; }
     else {
@@ -449,7 +459,7 @@ static void cluster(const uint64_t *live, int bins, double from, double width, i
 
 /* What to bound: a cell and a window, over `entries` pairs if not NULL (those of a cell and window around these), over
    the raster if not NULL (then always of the full circle), or over all pairs. Only stretches worth more than `value`
-   count. `children`: where the pairs that reach into the window go, or NULL. `gap`: see cluster. */
+   count, and with gap 0 only the best of them. `children`: where the pairs that reach into the window go, or NULL. */
 typedef struct {
     const Node *node;
     double value;
@@ -466,9 +476,11 @@ typedef struct {
     const Query *q;
     Outcome *out;
     double from, width, middle, reach, scale; /* the window */
+    double fine;            /* a small part of a stretch */
     int bins;
     Counter counter;
-    uint32_t total[HEAVY_BINS], row[HEAVY_BINS];
+    uint32_t total[HEAVY_BINS], whole;
+    Row row;
 } Laying;
 
 /* Lay the arcs of one source point and some of its pairs. */
@@ -486,8 +498,8 @@ static inline int lay_pairs(Laying *l, uint32_t j, const Entry *list, int64_t lo
             apart = positive(apart - whole(apart + 0.5));
             if (apart > delta + pair->widest + l->reach) continue;
         }
-        double half_width = delta + pair_half_width(pair, near, far, delta / 32);
-        if (!lay(pair->turn - alpha, half_width, l->from, l->width, l->bins, l->scale, bits, l->row,
+        double half_width = delta + pair_half_width(pair, near, far, delta / 32 + l->fine);
+        if (!lay(pair->turn - alpha, half_width, l->from, l->width, l->bins, l->scale, bits, &l->row,
                  p->weight ? p->weight[number] : 1)) continue;
         touched = 1;
         out->painted++;
@@ -577,7 +589,9 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
     }
     l.bins = p->weight ? HEAVY_BINS : BINS;
     l.scale = l.bins / l.width;
+    l.fine = l.width / l.bins / 32;
     l.middle = l.from + l.width / 2; l.reach = l.width / 2 + 0x1p-40;
+    l.whole = 0;
     if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] = 0;
     else {
         for (int i = 0; i < PLANES; i++) l.counter.plane[i] = zero;
@@ -594,8 +608,8 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
             continue;
         }
         uint32_t j = q->parents ? w->active[i] : (uint32_t)i;
-        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.row[k] = 0;
-        else bits->all = zero;
+        l.row.whole = 0; l.row.clean = 1;
+        if (!p->weight) bits->all = zero;
         int touched;
         if (q->parents) {
             int64_t low = cursor;
@@ -603,18 +617,27 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
             touched = lay_pairs(&l, j, q->parents, low, cursor, near, far, alpha, delta, p->weight ? 0 : bits->word);
         } else touched = lay_row(&l, j, near, far, alpha, delta, p->weight ? 0 : bits->word);
         if (!touched) continue;
-        if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] += l.row[k];
-        else if (++l.counter.waiting == 8) counter_flush(&l.counter);
+        if (p->weight) {
+            uint32_t all = l.row.whole;
+            l.whole += all;
+            if (!l.row.clean)
+                for (int k = 0; k < HEAVY_BINS; k++)
+                    l.total[k] += l.row.stretch[k] > all ? l.row.stretch[k] - all : 0;
+        } else if (++l.counter.waiting == 8) counter_flush(&l.counter);
     }
     if (q->children && out->entries > q->room) out->entries = -1; /* too many to keep */
 
     if (p->weight) {
         uint32_t best = 0;
-        for (int k = 0; k < HEAVY_BINS; k++) best = l.total[k] > best ? l.total[k] : best;
+        for (int k = 0; k < HEAVY_BINS; k++) {
+            l.total[k] += l.whole;
+            best = l.total[k] > best ? l.total[k] : best;
+        }
         out->bound = best;
         if ((double)best <= q->value) return;
         uint64_t live[HEAVY_BINS / 64] = {0};
-        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > q->value) << (k & 63);
+        double value = q->gap ? q->value : best - 1.0;
+        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > value) << (k & 63);
         cluster(live, HEAVY_BINS, l.from, l.width, q->gap, out);
         for (int c = 0; c < out->clusters; c++) {
             out->cluster_bound[c] = 0;
@@ -626,10 +649,11 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
         return;
     }
     if (l.counter.waiting) counter_flush(&l.counter);
-    Bits above;
-    above.all = window.all & counter_above(&l.counter, q->value < 0 ? -1 : (int64_t)q->value);
     out->bound = counter_most(&l.counter, window.all);
-    if (!any(above.all)) return;
+    if ((double)out->bound <= q->value) return;
+    double value = q->gap ? q->value : out->bound - 1.0;
+    Bits above;
+    above.all = window.all & counter_above(&l.counter, value < 0 ? -1 : (int64_t)value);
     cluster(above.word, BINS, l.from, l.width, q->gap, out);
     for (int c = 0; c < out->clusters; c++) {
         Bits among;
@@ -707,26 +731,22 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
     for (int64_t i = 0; i < n; i++) {
         Node node = {x[i], y[i], 0, 0, 0, from, width, 0};
         Outcome out;
-        turns[i] = 0;
-        double best = 0x1p40;
-        Query query = {&node, best - 1, p->raster, 0, 0, 0, 0, 0};
+        turns[i] = bounds[i] = 0;
+        Query query = {&node, value, p->raster, 0, 0, 0, 0, 0};
         if (p->raster && width >= 1) {
             evaluate(p, &w, &query, &out);
-            bounds[i] = 0;
             if (out.bound <= value) continue;
         }
         query.raster = 0;
         for (int zoom = 0; zoom < 5; zoom++) {
             evaluate(p, &w, &query, &out);
-            bounds[i] = best = out.bound;
-            if (best <= value || best == 0) break;
-            query.value = best - 1;
-            if (!out.clusters) evaluate(p, &w, &query, &out);
+            bounds[i] = out.bound;
+            if (!out.clusters) break;
             turns[i] = out.cluster_from[0] + 0.5 * out.cluster_width[0];
             if (out.cluster_width[0] > FULL) break;
             node.from = out.cluster_from[0]; node.width = out.cluster_width[0];
         }
-        if (best > value) value = best;
+        if (bounds[i] > value) value = bounds[i];
         else bounds[i] = 0;
     }
 }
