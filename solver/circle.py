@@ -28,6 +28,8 @@ def on_circle(points: Complexes) -> Complexes:
     """Return points, (k,), that all but lie in order on the unit circle, strictly so."""
     points = points / np.abs(points)
     arcs = np.angle(np.roll(points, -1) / points)
+    if arcs.sum() < np.pi:  # one arc is longer than half the circle
+        arcs[np.argmin(arcs)] += 2 * np.pi
     if arcs.min() >= 0.5 * smallest_arc(len(arcs)):
         return points
     return points[0] * np.exp(1j * angles_of_arcs(np.maximum(arcs, 0)))

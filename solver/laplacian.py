@@ -14,18 +14,23 @@ def mollified_lengths(lengths: Floats, relative: float = 1e-6) -> Floats:
     Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes" (2020), section 4.5: the smallest constant that makes
     each triangle inequality hold with a margin of `relative` times the triangle's longest side; zero for a clean mesh.
     """
-    margin = relative * np.maximum(lengths.max(axis=1), relative * lengths.mean())
-    lack = margin + 2 * lengths.max(axis=1) - lengths.sum(axis=1)
+    a, b, c = lengths.T
+    longest = np.maximum(np.maximum(a, b), c)
+    margin = relative * np.maximum(longest, relative * lengths.mean())
+    lack = margin + 2 * longest - (a + b + c)
     return lengths + max(0.0, float(lack.max()))
 
 
 def cotangents(lengths: Floats) -> Floats:
     """Return the cotangent of each corner, (m, 3), of triangles given by the side opposite each corner, (m, 3)."""
-    a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
+    x, y, z = lengths.T
+    low, high = np.minimum(x, y), np.maximum(x, y)
+    a, b, c = np.maximum(high, z), np.maximum(low, np.minimum(high, z)), np.minimum(low, z)
     # Kahan's arrangement of Heron's formula keeps its digits on needles
     area = 0.25 * np.sqrt(np.maximum((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c)), 0))
-    square = lengths**2
-    return (square.sum(axis=1, keepdims=True) - 2 * square) / (4 * np.maximum(area, np.finfo(float).tiny)[:, None])
+    area = np.maximum(area, np.maximum(1e-18 * a**2, np.finfo(float).tiny))
+    x, y, z = x**2, y**2, z**2
+    return np.stack([y + z - x, z + x - y, x + y - z], axis=1) / (4 * area)[:, None]
 
 
 def cotangent_laplacian(faces: Integers, lengths: Floats, vertex_count: int) -> csr_array:

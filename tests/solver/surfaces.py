@@ -1,7 +1,9 @@
 """Surfaces whose conformal map to the disc is known, for the solver's tests."""
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.spatial import Delaunay
+from scipy.special import ellipj, ellipk
 
 from solver import Mobius, TriangleMesh
 from solver.mobius import conformal_barycentre
@@ -41,6 +43,44 @@ def spherical_cap(count: int, polar_angle: float, jitter: float = 0.0) -> tuple[
     # seen from outside, the pole towards the eye: counter-clockwise stays counter-clockwise
     mesh = TriangleMesh(on_sphere, planar(points).faces, "cap")
     return mesh, np.tan(polar / 2) / np.tan(polar_angle / 2) * around
+
+
+def half_disc(count: int) -> np.ndarray:
+    """Points of the closed upper half of the unit disc, complex, the diameter included."""
+    arcs = [k / count * np.exp(1j * np.pi * np.arange(3 * k + 1) / (3 * k)) for k in range(1, count + 1)]
+    return np.concatenate([np.zeros(1, complex), *arcs])
+
+
+def half_disc_to_disc(z: np.ndarray) -> np.ndarray:
+    """Riemann map of the upper half of the unit disc: to a quadrant, squared to the half-plane, to the disc."""
+    return ((1 + z) ** 2 - 1j * (1 - z) ** 2) / ((1 + z) ** 2 + 1j * (1 - z) ** 2)
+
+
+def rectangle(columns: int, height: float, jitter: float = 0.0) -> np.ndarray:
+    """Points of the closed rectangle |x| <= 1, |y| <= height, complex, `columns` squares wide."""
+    rows = round(columns * height)
+    x, y = np.meshgrid(np.linspace(-1, 1, columns + 1), np.linspace(-height, height, rows + 1))
+    rng = np.random.default_rng(0)
+    inside = (np.abs(x) < 1 - 1e-9) & (np.abs(y) < height - 1e-9)
+    x, y = (a + inside * jitter * 2 / columns * rng.uniform(-1, 1, a.shape) for a in (x, y))
+    return (x + 1j * y).ravel()
+
+
+def rectangle_to_disc(z: np.ndarray, height: float) -> np.ndarray:
+    """Riemann map of the rectangle |x| <= 1, |y| <= height: sn to the half-plane, then the disc, centre to centre."""
+    m = brentq(lambda m: ellipk(1 - m) - 2 * height * ellipk(m), 1e-12, 1 - 1e-12)
+    scale = ellipk(m)
+    over, under = _sn(scale * z.real, scale * (z.imag + height), m)
+    at, unit = _sn(np.zeros(1), np.full(1, scale * height), m)
+    middle = at[0] / unit[0]
+    return (over - middle * under) / (over - np.conj(middle) * under)
+
+
+def _sn(x: np.ndarray, y: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator of sn(x + i y | m)."""
+    s, c, d, _ = ellipj(x, m)
+    s1, c1, d1, _ = ellipj(y, 1 - m)
+    return s * d1 + 1j * c * d * s1 * c1, c1**2 + m * s**2 * s1**2
 
 
 def turned_onto(disc: np.ndarray, truth: np.ndarray, mesh: TriangleMesh) -> np.ndarray:
