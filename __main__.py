@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -41,5 +43,17 @@ def main() -> int:
         return 2
 
 
+def leave(status: int) -> None:
+    """End the process now, its output written and Blender's temporary folder removed.
+
+    Blender's module, once loaded, sometimes waits for its own threads for ever in the C library's exit handlers.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if "bpy" in sys.modules and (folder := sys.modules["bpy"].app.tempdir):
+        shutil.rmtree(folder, ignore_errors=True)
+    os._exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())
