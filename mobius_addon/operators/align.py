@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ... import solver
 from ...solver.mesh import Floats
@@ -109,7 +109,7 @@ def on_source(alignment: solver.Alignment, correspondence: solver.Correspondence
     places = (correspondence.matrix() @ mesh.vertices)[found]
     on_vertices = np.zeros(len(mesh.vertices))
     used = np.unique(mesh.faces)
-    on_vertices[used] = values[found[cKDTree(places).query(mesh.vertices[used])[1]]]
+    on_vertices[used] = values[found[KDTree(places).query(mesh.vertices[used])[1]]]
     return on_vertices
 
 
