@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
-from scipy.optimize import brentq
-from scipy.special import ellipj, ellipk
-from surfaces import largest_error, planar, rings
+from surfaces import largest_error, planar, rectangle_to_disc, rings
 
 from solver import MeshError, TriangleMesh, flatten, topology
 from solver.circle_packing import _layout, packing_radii, silhouette_mesh
@@ -70,24 +68,10 @@ def test_the_packing_of_a_round_shape_tends_to_the_identity():
 def test_the_packing_of_a_square_tends_to_its_riemann_map():
     mesh = silhouette_mesh(np.ones((240, 240), bool), 8000)
     points = (mesh.vertices - [120, 120, 0]) @ [1, 1j, 0] / 120 * 0.999
-    truth = square_to_disc(points)
+    truth = rectangle_to_disc(points, 1)
     assert largest_error(flatten(mesh, "circle-packing").disc, truth / np.maximum(np.abs(truth), 1), mesh) < 0.12
     median = np.median(np.abs(flatten(mesh, "circle-packing").disc) - np.abs(truth))
     assert abs(median) < 0.01
-
-
-def square_to_disc(z: np.ndarray) -> np.ndarray:
-    """Riemann map of the square with corners +-1 +-i: its half is sn of a quarter-turned square, in the half-plane."""
-    # sn maps the rectangle (-K, K) x (0, K') to the upper half-plane; K' = 2 K makes it a square
-    m = brentq(lambda m: ellipk(1 - m) - 2 * ellipk(m), 1e-6, 0.9)
-    K = ellipk(m)
-    u = K * z.real + 1j * (K * z.imag + K)
-    s, c, d, _ = ellipj(u.real, m)
-    s1, c1, d1, _ = ellipj(u.imag, 1 - m)
-    sn = (s * d1 + 1j * c * d * s1 * c1) / (c1**2 + m * s**2 * s1**2)
-    s0, c0, _, _ = ellipj(K, 1 - m)
-    middle = 1j * s0 / c0
-    return (sn - middle) / (sn - np.conj(middle))
 
 
 @pytest.mark.parametrize("name", SHAPES)
