@@ -117,7 +117,7 @@ def summary(source: str, target: str, alignment: solver.Alignment, correspondenc
     """Return one sentence about an alignment: what matched, and what is proved about it."""
     search = alignment.search
     proof = (
-        "certified: no other Möbius map matches more"
+        f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more"
         if search.certified
         else f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
     )

@@ -126,7 +126,7 @@ def test_align_writes_map_and_report(scans: Path, capsys: pytest.CaptureFixture[
     arguments = ["--map", map_file, "--report", report_file, *QUICK]
     status, out, err = run(capsys, "align", scans / "source.obj", scans / "target.obj", *arguments)
     assert (status, err) == (0, "")
-    assert "certified: no other Möbius map matches more" in out
+    assert "certified: no Möbius map with |z| <= 0.83 matches more" in out
     report = json.loads(report_file.read_text())
     assert report["certified"] is True
     assert report["upper_bound"] == pytest.approx(report["value"])
