@@ -154,7 +154,8 @@ def _mutually_closest(best: Incumbent, points: Complexes, z: Complexes, theta: F
     square = rows.astype(np.float32) @ columns.astype(np.float32)  # single precision, as it only ranks the pairs
     if not best.weights.all():
         square[:, best.weights == 0] = np.inf
-    forth, back = square.argmin(axis=2), square.argmin(axis=1)
-    mutual = np.take_along_axis(back, forth, axis=1) == np.arange(len(points))
+    forth = square.argmin(axis=2)
+    nearest = np.take_along_axis(square, forth[:, :, None], axis=2)[:, :, 0]
+    mutual = nearest == np.take_along_axis(square.min(axis=1), forth, axis=1)
     mutual &= best.weights[np.arange(len(points)), forth] > 0
     return np.where(mutual, forth, -1), np.abs(residuals(image, target[forth], best.metric)[0])

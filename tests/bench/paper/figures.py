@@ -33,7 +33,7 @@ def run_times(path: Path, rows: list[dict[str, Any]], times: list[dict[str, Any]
     axes.annotate("search, quoted", (100, 10), (106, 30), fontsize=7)
     axes.axhline(quoted.BRUTE_FORCE_SECONDS, color="black", linewidth=0.8, linestyle=":")
     axes.annotate("brute force, quoted: 3 hours an instance", (20, 5e3), fontsize=7)
-    axes.set(xscale="log", yscale="log", xlabel="N", ylabel="seconds, one core", title=f"Run time, {objective}")
+    axes.set(xscale="log", yscale="log", xlabel="N", ylabel="seconds of one core", title=f"Run time, {objective}")
     axes.set_xticks(sorted({row["N"] for row in shown}), [str(n) for n in sorted({row["N"] for row in shown})])
     axes.minorticks_off()
     axes.grid(alpha=0.3)

@@ -1,6 +1,7 @@
 """The methods that are compared, and one row of a table for what each finds."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,8 +14,8 @@ from solver.matching import matching
 from solver.measures import q_mv, q_truth
 from solver.search import SearchResult
 
-TIME_LIMIT = 60.0
-"""Seconds after which the search gives the gap instead of the certificate."""
+TIME_LIMIT = 300.0
+"""Seconds, by the clock, after which the search gives the gap instead of the certificate."""
 
 METHODS = {
     "Möbius search": partial(search, time_limit=TIME_LIMIT, threads=1),
@@ -63,8 +64,10 @@ class Problem:
 
 
 def result(problem: Problem, name: str, **more: Any) -> SearchResult:
-    """Run one of the METHODS."""
-    return METHODS[name](problem.source, problem.target, problem.radius, **problem.options, **more)
+    """Run one of the METHODS; its seconds are those of the processor, so that what else runs does not count."""
+    started = time.process_time()
+    found = METHODS[name](problem.source, problem.target, problem.radius, **(problem.options | more))
+    return replace(found, seconds=time.process_time() - started)
 
 
 def row(problem: Problem, name: str, found: SearchResult) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from solver import Flattening, Mobius, flatten, silhouette_mesh
-from solver.baselines import brute_force, icp
 from solver.mobius import hyperbolic_distance
 from tests.solver.gif import read_gif
 
@@ -126,7 +125,7 @@ def measured(setting: Setting) -> list[dict[str, Any]]:
     add("Algorithm 1, stop as printed", _valued(problem, literal), problem, planted, proven.value, good)
     mild, gentle, inliers = drawn(replace(setting, mild=True))
     optimum = result(mild, "Möbius search").value
-    add("ICP2 (mild)", icp(mild.source, mild.target, EPSILON, **mild.options), mild, gentle, optimum, inliers)
+    add("ICP2 (mild)", result(mild, "ICP"), mild, gentle, optimum, inliers)
     return rows
 
 
@@ -136,16 +135,13 @@ def _value(problem: Problem, mobius: Mobius) -> float:
 
 def _valued(problem: Problem, mobius: Mobius) -> Any:
     """Return a given transformation as a result: closest points, stopped before their first round."""
-    return icp(problem.source, problem.target, problem.radius, **problem.options, start=mobius, iterations=0)
+    return result(problem, "ICP", start=mobius, iterations=0)
 
 
 def timed(setting: Setting, grid: bool) -> dict[str, Any]:
     """Return size and seconds of the search alone or of brute force on the papers' grid of rotations."""
     problem, *_ = drawn(setting)
-    if grid:
-        found = brute_force(problem.source, problem.target, EPSILON, **problem.options, rotations=GRID)
-    else:
-        found = result(problem, "Möbius search")
+    found = result(problem, "brute force", rotations=GRID) if grid else result(problem, "Möbius search")
     name = f"brute force, {GRID} rotations" if grid else "Möbius search"
     return {"objective": setting.objective, "N": setting.n} | row(problem, name, found)
 
@@ -153,8 +149,7 @@ def timed(setting: Setting, grid: bool) -> dict[str, Any]:
 def collapsing(setting: Setting, z_max: float) -> dict[str, Any]:
     """Return what the proven optimum is if |z| is bounded by z_max."""
     problem, planted, good = drawn(setting)
-    options = problem.options | {"z_max": z_max}
-    found = METHODS["Möbius search"](problem.source, problem.target, EPSILON, **options)
+    found = result(problem, "Möbius search", z_max=z_max)
     off = hyperbolic_distance(found.mobius(problem.source[good]), planted(problem.source[good]))
     return {
         "objective": setting.objective,
