@@ -24,8 +24,10 @@ from .mesh import Complexes, Floats, Integers
 from .mobius import Mobius
 
 CELLS_AT_ONCE = 64
-"""Open cells taken on in one round, the best bounds first. The threads share them, so that what a round finds does not
-depend on how many threads there are."""
+"""Open cells taken on in one round, the best bounds first."""
+
+SHARES = 8
+"""Parts that a round is dealt out in, whatever the number of threads, so that it finds the same with any."""
 
 FRONTIER = 1 << 18
 """Open cells, 64 bytes each, beyond which the smallest are searched first: then the search is depth first, and adds
@@ -238,7 +240,7 @@ class _Search:
     def _expanded(self, side: int, cells: Floats, budget: int, pool: ThreadPoolExecutor | None) -> Floats:
         """Return what is left of cells after splitting each for a while; the threads share the work."""
         kernels, value = self.kernels[side], self.value
-        shares = [cells[k : k + 4] for k in range(0, len(cells), 4)] if pool else [cells]
+        shares = [cells[k::SHARES] for k in range(min(SHARES, len(cells)))]
         run = pool.map if pool else map
         parts = list(run(lambda share: kernels.expand(share, value, budget), shares))
         self.nodes += sum(spent for _, spent in parts)

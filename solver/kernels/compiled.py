@@ -7,6 +7,7 @@ import importlib
 import logging
 import threading
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -49,16 +50,18 @@ def library() -> ctypes.CDLL | None:
     """Return the fastest library that runs here, or None, which the log explains in a sentence."""
     try:
         found = importlib.import_module("mobius_kernels").LIBRARIES
-        plain = _checked(ctypes.CDLL(str(found[0])))
+        plain = opened(found[0])
         if len(found) > 1 and plain.mobius_runs_v3():
-            return _checked(ctypes.CDLL(str(found[1])))
+            return opened(found[1])
     except (ImportError, OSError) as error:
         log.warning("No compiled kernels (%s): the search runs in numpy, many times slower.", error)
         return None
     return plain
 
 
-def _checked(loaded: ctypes.CDLL) -> ctypes.CDLL:
+def opened(path: Path) -> ctypes.CDLL:
+    """Return a library with its functions declared, or raise ImportError if it is of another version."""
+    loaded = ctypes.CDLL(str(path))
     if loaded.mobius_interface() != INTERFACE:
         raise ImportError(f"mobius_kernels has interface {loaded.mobius_interface()}, not {INTERFACE}")
     loaded.mobius_work_bytes.restype = _I64

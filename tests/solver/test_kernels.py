@@ -1,5 +1,6 @@
 """The compiled kernels against the numpy reference, value for value."""
 
+import importlib
 import logging
 import sys
 
@@ -192,6 +193,22 @@ def test_search_finds_the_same_value_with_either(monkeypatch, weighted):
         assert fast.certified
         assert slow.certified
         assert fast.value == slow.value
+
+
+def test_every_processor_computes_the_same(monkeypatch):
+    rng = np.random.default_rng(3)
+    source, target = planted(rng, Mobius(0.2 + 0.1j, 1.0), 50, 0.4, 0.01)
+    weights = rng.random((50, 50)) * (rng.random((50, 50)) < 0.5)
+    found = []
+    for path in importlib.import_module("mobius_kernels").LIBRARIES:
+        loaded = compiled.opened(path)
+        if "v3" in path.name and not loaded.mobius_runs_v3():
+            continue
+        monkeypatch.setattr(compiled, "library", lambda loaded=loaded: loaded)
+        for options in ({"weights": weights}, {"metric": "euclidean"}):
+            result = search(source, target, 0.03, z_max=0.8, **options)
+            found.append((result.value, result.upper_bound, result.nodes, result.mobius))
+    assert len(set(found)) == 2
 
 
 def test_without_the_library_the_reference_runs_and_a_sentence_says_so(monkeypatch, caplog):

@@ -1,3 +1,4 @@
+import sys
 import time
 
 import numpy as np
@@ -151,6 +152,32 @@ def test_same_input_same_answer():
     source, target = planted(rng, random_mobius(rng, 0.5), 30, 0.5, 0.01)
     a, b = (search(source, target, 0.02, z_max=0.8) for _ in range(2))
     assert (a.value, a.upper_bound, a.nodes, a.mobius) == (b.value, b.upper_bound, b.nodes, b.mobius)
+
+
+def test_any_number_of_threads_finds_the_same():
+    rng = np.random.default_rng(8)
+    source, target = planted(rng, random_mobius(rng, 0.5), 60, 0.5, 0.01)
+    found = [search(source, target, 0.02, z_max=0.8, threads=n) for n in (1, 2, 5)]
+    assert len({(f.value, f.upper_bound, f.nodes, f.mobius) for f in found}) == 1
+
+
+def test_a_full_frontier_is_searched_depth_first(monkeypatch):
+    rng = np.random.default_rng(10)
+    source, target = planted(rng, random_mobius(rng, 0.5), 40, 0.6, 0.01)
+    free = search(source, target, 0.03, z_max=0.8)
+    monkeypatch.setattr(sys.modules["solver.search"], "FRONTIER", 20)
+    held = search(source, target, 0.03, z_max=0.8)
+    assert held.certified
+    assert held.value == free.value
+
+
+def test_one_to_one_counts_no_target_twice():
+    target = np.array([0.3, -0.5])
+    many = search([0.3, 0.3001, 0.2999, -0.5], target, 0.05, z_max=0.3)
+    assert (many.value, many.one_to_one) == (4, 2)
+    weights = np.array([[0.5, 0], [0.25, 0], [0, 1.0]])
+    weighted = search([0.3, 0.3, -0.5], target, 0.05, weights=weights, z_max=0.3)
+    assert (weighted.value, weighted.one_to_one) == (1.75, 1.5)
 
 
 def test_nothing_is_compatible():
