@@ -47,6 +47,8 @@ class AlignSettings:
         Seconds for each search.
     refine : str
         "none": the search's transformation; "mobius": improved on all vertices.
+    fill_holes : bool
+        Allow meshes with openings: all boundary loops but the longest are closed for the computation.
     """
 
     samples: int = 100
@@ -59,6 +61,7 @@ class AlignSettings:
     reflect_margin: float = 0.06
     time_limit: float | None = 60.0
     refine: str = "mobius"
+    fill_holes: bool = False
 
     def __post_init__(self) -> None:
         for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius"))):
@@ -149,9 +152,9 @@ def align(
     settings = settings or AlignSettings()
     clock = _Stages(progress)
     clock.begin("flatten source", "Flattening the source", 0.0)
-    source = flatten(source_mesh)
+    source = flatten(source_mesh, fill_holes=settings.fill_holes)
     clock.begin("flatten target", "Flattening the target", 0.08)
-    target = flatten(target_mesh)
+    target = flatten(target_mesh, fill_holes=settings.fill_holes)
     clock.begin("descriptors", "Measuring curvature", 0.16)
     source_descriptors = standardised(diffused_mean_curvature(source_mesh), source_mesh.vertex_areas)
     target_descriptors = standardised(diffused_mean_curvature(target_mesh), target_mesh.vertex_areas)
