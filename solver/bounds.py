@@ -194,7 +194,7 @@ def _slopes(source: Complexes, centre: Complexes) -> tuple[Complexes, Complexes]
 
 def _taxicab(x: Complexes) -> Floats:
     """Return |Re x| + |Im x|, the largest |Im(x y)| over |Re y|, |Im y| <= 1."""
-    return np.abs(x.real) + np.abs(x.imag)
+    return np.asarray(np.abs(x.real) + np.abs(x.imag), dtype=np.float64)
 
 
 def _arcsine(s: Floats) -> Floats:

@@ -203,7 +203,7 @@ def _holds_exactly(pairs: _Pairs, box: Floats, bound: float) -> bool:
     alive = np.ones((1, len(pairs.m)), bool)
     # only what the float arithmetic called dead can be shown dead
     for i in np.flatnonzero(~_alive(pairs, box[None])[0]).tolist():
-        m, b, tau = _exactly(pairs.m[i]), _exactly(pairs.b[i]), Fraction(float(pairs.tau[i]))
+        m, b, tau = _exactly(complex(pairs.m[i])), _exactly(complex(pairs.b[i])), Fraction(float(pairs.tau[i]))
         size_m, size_b = _root_up(_square(m)), _root_up(_square(b))
         distance = _root_up(_square((m[0] - x, m[1] - y)))
         step = r + t * (distance + r)

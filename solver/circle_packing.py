@@ -130,7 +130,7 @@ def _corner_angles(faces: Integers, y: Floats) -> Floats:
     """Return the angle at each corner, (m, 3), between the hyperbolic centres of three tangent circles."""
     own, left, right = y[faces], y[faces[:, [1, 2, 0]]], y[faces[:, [2, 0, 1]]]
     square = own * (1 - left) * (1 - right) / ((1 - own * left) * (1 - own * right))
-    return 2 * np.arcsin(np.sqrt(np.clip(square, 0, 1)))
+    return 2.0 * np.arcsin(np.sqrt(np.clip(square, 0, 1)))
 
 
 def _angle_sums(faces: Integers, y: Floats) -> Floats:

@@ -147,7 +147,7 @@ def _assignment(best: Incumbent, gain: Floats) -> Floats:
 
 def _lengths(points: Complexes) -> Floats:
     """Return the lengths between points, (n, n), in the Poincaré metric of curvature -1."""
-    return 2 * np.arctanh(np.minimum(distances(points, points, "hyperbolic"), 1 - 1e-12))
+    return 2.0 * np.arctanh(np.minimum(distances(points, points, "hyperbolic"), 1 - 1e-12))
 
 
 def _lengths_of_radii(best: Incumbent) -> Floats:
@@ -157,4 +157,4 @@ def _lengths_of_radii(best: Incumbent) -> Floats:
     outermost = np.abs(best.problem.centre) + best.problem.radius
     length = np.abs(best.target[best.problem.target])
     radius[best.problem.target] = np.abs(outermost - length) / np.maximum(np.abs(1 - length * outermost), 1e-12)
-    return 2 * np.arctanh(np.minimum(radius, LARGEST_RADIUS))
+    return 2.0 * np.arctanh(np.minimum(radius, LARGEST_RADIUS))
