@@ -74,7 +74,7 @@ def quadratic_best(problem: Matching, z: complex, inward: float = 1e-10) -> floa
 
 
 def hypotheses(problem: Matching, z_max: float) -> np.ndarray:
-    """The z of every Möbius that carries two source points to the centres of two of their match discs, nearly."""
+    """The z of Möbius maps that carry two source points to the centres of two of their match discs: 1,500 at most."""
     found = [0j]
     inside = np.abs(problem.source[problem.point]) < 1 - 1e-6
     pairs = list(zip(problem.point[inside].tolist(), problem.centre[inside].tolist(), strict=True))
@@ -84,7 +84,8 @@ def hypotheses(problem: Matching, z_max: float) -> np.ndarray:
             if j != k:  # carry m_j to 0, turn so that m_k points at d seen from c, carry 0 to c
                 theta = float(np.angle(last(d)) - np.angle(first(problem.source[k])))
                 found.append((last.inverse() @ Mobius(0, theta) @ first).z)
-    return np.array([z for z in found if abs(z) <= z_max])
+    inside = np.array([z for z in found if abs(z) <= z_max])
+    return inside[np.random.default_rng(0).permutation(len(inside))[:1500]]
 
 
 def brute_force(problem: Matching, z_max: float, steps: int) -> float:

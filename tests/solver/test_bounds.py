@@ -31,7 +31,7 @@ def points_of_cells(rng, centre, half):
     return z, np.abs(z) < 1
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(SEEDS)
 def test_bound_of_a_cell_exceeds_the_value_at_every_point_of_it(seed):
     rng = np.random.default_rng(seed)
@@ -57,7 +57,7 @@ def test_bound_of_a_cell_exceeds_the_slow_reference(seed):
         assert quadratic_best(problem, x) <= bound
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(SEEDS)
 def test_every_matching_rotation_of_every_z_lies_in_the_enclosing_arc(seed):
     """Pair by pair: stronger than the count, where one arc too wide may hide another too narrow."""

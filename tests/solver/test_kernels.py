@@ -73,7 +73,7 @@ def test_images_are_the_same(seed):
         assert (np.abs(f - far[k]) <= 2.0**-44 / span + 1e-13).all()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(SEEDS)
 def test_bounds_are_those_of_the_sweep_up_to_one_stretch(seed):
     """Arcs rounded outward to whole stretches hold the arcs, and are held by arcs one stretch wider at both ends."""
@@ -88,7 +88,7 @@ def test_bounds_are_those_of_the_sweep_up_to_one_stretch(seed):
     assert (found[:, BOUND] <= swept(problem, nodes, kappa, 1.07 * stretch)).all()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(SEEDS)
 def test_bound_of_a_cell_exceeds_the_value_at_every_point_of_it(seed):
     rng = np.random.default_rng(seed)
@@ -117,7 +117,7 @@ def test_the_raster_rounds_outward(seed):
     assert (best_rotations(problem, z[inside])[0] <= coarse[inside]).all()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(SEEDS)
 def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(seed):
     rng = np.random.default_rng(seed)
