@@ -48,7 +48,9 @@ class AlignSettings:
     refine : str
         "none": the search's transformation; "mobius": improved on all vertices.
     fill_holes : bool
-        Allow meshes with openings: all boundary loops but the longest are closed for the computation.
+        Allow meshes with openings: all boundary loops but the outer one are closed for the computation.
+    source_outer, target_outer : int, optional
+        A vertex on the loop that is to be the outer one; by default the longest loop is.
     """
 
     samples: int = 100
@@ -62,6 +64,8 @@ class AlignSettings:
     time_limit: float | None = 60.0
     refine: str = "mobius"
     fill_holes: bool = False
+    source_outer: int | None = None
+    target_outer: int | None = None
 
     def __post_init__(self) -> None:
         for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius"))):
@@ -152,9 +156,9 @@ def align(
     settings = settings or AlignSettings()
     clock = _Stages(progress)
     clock.begin("flatten source", "Flattening the source", 0.0)
-    source = flatten(source_mesh, fill_holes=settings.fill_holes)
+    source = flatten(source_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.source_outer)
     clock.begin("flatten target", "Flattening the target", 0.08)
-    target = flatten(target_mesh, fill_holes=settings.fill_holes)
+    target = flatten(target_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.target_outer)
     clock.begin("descriptors", "Measuring curvature", 0.16)
     source_descriptors = standardised(diffused_mean_curvature(source_mesh), source_mesh.vertex_areas)
     target_descriptors = standardised(diffused_mean_curvature(target_mesh), target_mesh.vertex_areas)

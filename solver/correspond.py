@@ -9,8 +9,9 @@ from scipy.sparse import csr_array
 
 from .align import Alignment
 from .distortion import log_conformal_factor
+from .flatten import Flattening
 from .locate import TriangulatedDisc
-from .mesh import Booleans, Floats, Integers
+from .mesh import Booleans, Complexes, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,8 @@ class Correspondence:
 def correspond(alignment: Alignment) -> Correspondence:
     """Carry every target vertex through the discs into the source.
 
-    The vertex's place in the target's disc is taken back by the inverse transformation and located in the source's.
+    The vertex's place in the target's disc is taken back by the inverse transformation and located in the source's. One
+    that comes to lie in an opening of the source takes the nearest point of its rim, with a confidence of 0.
     """
     source, target, back = alignment.source, alignment.target, alignment.mobius.inverse()
     size = len(target.disc)
@@ -59,9 +61,11 @@ def correspond(alignment: Alignment) -> Correspondence:
     disc = TriangulatedDisc.of(source.disc, source.mesh.faces)
     face = np.full(size, -1)
     barycentric = np.zeros((size, 3))
-    face[used], barycentric[used] = disc.locate(back(target.disc[used]))
+    places = back(target.disc[used])
+    face[used], barycentric[used] = disc.locate(places)
     confidence = np.zeros(size)
     confidence[used] = _confidence(alignment, face[used], barycentric[used], used)
+    confidence[used[in_openings(source, places, face[used], barycentric[used])]] = 0
     return Correspondence(
         face=face,
         barycentric=barycentric,
@@ -70,6 +74,16 @@ def correspond(alignment: Alignment) -> Correspondence:
         source_triangles=source.mesh.faces,
         source_size=len(source.disc),
     )
+
+
+def in_openings(flattening: Flattening, places: Complexes, face: Integers, barycentric: Floats) -> Booleans:
+    """Return which points of the disc, (q,), lie in an opening: their nearest point, as located, is on its rim."""
+    on_rim = np.zeros(len(flattening.disc), bool)
+    for loop in flattening.holes:
+        on_rim[loop] = True
+    corners = flattening.mesh.faces[face]
+    nearest = (flattening.disc[corners] * barycentric).sum(axis=1)
+    return (on_rim[corners] | (barycentric == 0)).all(axis=1) & (np.abs(nearest - places) > 1e-9)
 
 
 def _confidence(alignment: Alignment, face: Integers, barycentric: Floats, used: Integers) -> Floats:
