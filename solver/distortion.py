@@ -80,10 +80,10 @@ def dilatations(mesh: TriangleMesh, plane: Complexes) -> Floats:
     # the integral of |grad f|^2 over a triangle: half the cotangents times the squared sides in the plane
     energy = 0.5 * (cotangents(mesh.edge_lengths) * squares).sum(axis=1)
     area = signed_areas(plane, mesh.faces)
-    ratio = np.divide(energy, 2 * area, out=np.full(len(area), np.inf), where=area > 0)
-    ratio = np.maximum(ratio, 1)
+    ratio: Floats = np.divide(energy, 2 * area, out=np.full(len(area), np.inf), where=area > 0)
+    np.maximum(ratio, 1, out=ratio)
     ratio[mesh.face_areas <= 1e-12 * mesh.edge_lengths.max(axis=1) ** 2] = np.nan
-    return ratio + np.sqrt((ratio - 1) * (ratio + 1))
+    return ratio + np.sqrt((ratio - 1.0) * (ratio + 1.0))
 
 
 def log_conformal_factor(mesh: TriangleMesh, plane: Complexes) -> Floats:
@@ -92,7 +92,7 @@ def log_conformal_factor(mesh: TriangleMesh, plane: Complexes) -> Floats:
     around = np.bincount(mesh.faces.ravel(), np.repeat(flat / 3, 3), minlength=len(mesh.vertices))
     tiny = np.finfo(float).tiny
     factor = 0.5 * np.log(np.maximum(around, tiny) / np.maximum(mesh.vertex_areas, tiny))
-    factor[np.setdiff1d(np.arange(len(factor)), mesh.faces)] = np.nan
+    factor[np.bincount(mesh.faces.ravel(), minlength=len(factor)) == 0] = np.nan
     return factor
 
 

@@ -123,8 +123,8 @@ def _turned(disc: Complexes, mesh: TriangleMesh) -> int:
 def _surface(mesh: TriangleMesh, holes: tuple[Integers, ...]) -> IntrinsicTriangulation:
     """Return the disc that a mesh is when its holes are closed; the mesh's faces and vertices come first."""
     faces, lengths, count = filled(mesh, holes)
-    edge_of_side = edges_of_sides(faces, count)[1] if holes else mesh.edge_of_side
-    return IntrinsicTriangulation(faces, mollified_lengths(lengths), twin_sides(edge_of_side), count)
+    twins = twin_sides(edges_of_sides(faces, count)[1]) if holes else mesh.twins
+    return IntrinsicTriangulation(faces, mollified_lengths(lengths), twins, count)
 
 
 def _outer_loop(mesh: TriangleMesh, found: Topology, vertex: int | None) -> tuple[Integers, tuple[Integers, ...]]:

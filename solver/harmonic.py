@@ -59,7 +59,7 @@ def _dirichlet_systems(surface: IntrinsicTriangulation, boundary: Integers) -> t
     inside[surface.faces] = True
     inside[boundary] = False
     interior = np.flatnonzero(inside)
-    place = np.empty(n, np.intp)
+    place = np.empty(n, np.int32)  # what SuperLU takes
     place[interior] = np.arange(len(interior))
     place[boundary] = np.arange(len(boundary))
 
@@ -68,7 +68,7 @@ def _dirichlet_systems(surface: IntrinsicTriangulation, boundary: Integers) -> t
     total = np.bincount(i, weight, minlength=n) + np.bincount(j, weight, minlength=n)
     both = inside[i] & inside[j]
     a, b, w = place[i[both]], place[j[both]], weight[both]
-    own = np.arange(len(interior))
+    own = np.arange(len(interior), dtype=np.int32)
     inner = coo_array(
         (np.concatenate([-w, -w, total[interior]]), (np.concatenate([a, b, own]), np.concatenate([b, a, own]))),
         shape=(len(interior), len(interior)),

@@ -115,6 +115,11 @@ class TriangleMesh:
     def _edges_of_sides(self) -> tuple[Integers, Integers]:
         return edges_of_sides(self.faces, len(self.vertices))
 
+    @cached_property
+    def twins(self) -> Integers:
+        """The other side of each side's edge, (3 m,); -1 where the edge has one side, or more than two."""
+        return twin_sides(self.edge_of_side)
+
     @property
     def diagonal(self) -> float:
         """Length of the bounding box diagonal of the vertices in use, in length units."""
@@ -152,7 +157,7 @@ def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Intege
 
 
 def twin_sides(edge_of_side: Integers) -> Integers:
-    """Return the other side of each side's edge, (3 m,), -1 on the boundary, where no edge has three sides.
+    """Return the other side of each side's edge, (3 m,); -1 where the edge has one side, or more than two.
 
     >>> twin_sides(edges_of_sides(np.array([[0, 1, 2], [2, 1, 3]]), 4)[1]).tolist()
     [5, -1, -1, -1, -1, 0]

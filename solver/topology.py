@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from .mesh import Booleans, Integers, MeshError, TriangleMesh, directed_edges, edges_of_sides, plural
+from .mesh import Booleans, Integers, MeshError, TriangleMesh, directed_edges, edges_of_sides, plural, twin_sides
 
 
 @dataclass(frozen=True)
@@ -117,15 +117,18 @@ def topology(mesh: TriangleMesh) -> Topology:
     'disc, 3 vertices, boundary of 3 edges'
     """
     n, faces = len(mesh.vertices), mesh.faces
-    degenerate = (faces == faces[:, [1, 2, 0]]).any(axis=1)
+    a, b, c = faces.T
+    degenerate = (a == b) | (b == c) | (c == a)
     # three vertices are an edge and the smallest vertex, which is opposite it
-    corner = np.argmin(faces, axis=1)
-    rows = np.arange(len(faces))
-    _, first = np.unique(mesh.edge_of_side[3 * rows + corner] * n + faces[rows, corner], return_index=True)
-    duplicate = np.ones(len(faces), bool)
-    duplicate[first] = False
+    opposite_a, opposite_b, opposite_c = mesh.edge_of_side.reshape(-1, 3).T
+    smallest = np.minimum(np.minimum(a, b), c)
+    key = np.where(smallest == a, opposite_a, np.where(smallest == b, opposite_b, opposite_c)) * n + smallest
+    duplicate = np.zeros(len(faces), bool)
+    if (np.diff(np.sort(key)) == 0).any():
+        duplicate[:] = True
+        duplicate[np.unique(key, return_index=True)[1]] = False
     proper = ~degenerate & ~duplicate
-    flat = proper & (mesh.face_areas <= 1e-12 * mesh.edge_lengths.max(axis=1) ** 2)
+    flat = proper & (mesh.face_areas <= 1e-12 * np.maximum.reduce(mesh.edge_lengths.T) ** 2)
 
     simple = faces[proper]
     edges, edge_of_side = (mesh.edges, mesh.edge_of_side) if proper.all() else edges_of_sides(simple, n)
@@ -142,7 +145,8 @@ def topology(mesh: TriangleMesh) -> Topology:
     joined = csr_array((np.ones(len(edges), np.int8), edges[:, 1], starts), shape=(n, n))
     parts = connected_components(joined, directed=False)[0] - int((~in_proper).sum())
 
-    fan_of_corner = _fans(simple, edge_of_side, ascending)
+    twins = mesh.twins if proper.all() else twin_sides(edge_of_side)
+    fan_of_corner = _fans(edge_of_side, ascending, None if (side_count > 2).any() else twins)
     vertex_of_fan = np.zeros(fan_of_corner.max(initial=-1) + 1, np.intp)
     vertex_of_fan[fan_of_corner] = simple.ravel()
     fans = np.bincount(vertex_of_fan, minlength=n)
@@ -180,17 +184,28 @@ def require_disc(mesh: TriangleMesh, *, fill_holes: bool = False) -> Topology:
     return found
 
 
-def _fans(faces: Integers, edge_of_side: Integers, ascending: Booleans) -> Integers:
-    """Label each corner, (3 m,), so that corners of one vertex agree if edges of two or more faces connect them."""
-    order = np.argsort(edge_of_side, kind="stable")
-    shared = edge_of_side[order[1:]] == edge_of_side[order[:-1]]
-    left, right = order[:-1][shared], order[1:][shared]
+def _fans(edge_of_side: Integers, ascending: Booleans, twins: Integers | None) -> Integers:
+    """Label each corner, (3 m,), so that corners of one vertex agree if edges of two or more faces connect them.
+
+    `twins` are the other sides of edges of two sides, None where some edge has more.
+    """
+    if twins is None:
+        order = np.argsort(edge_of_side, kind="stable")
+        shared = edge_of_side[order[1:]] == edge_of_side[order[:-1]]
+        left, right = order[:-1][shared], order[1:][shared]
+    else:
+        left = np.flatnonzero(twins > np.arange(len(twins)))
+        right = twins[left]
     # side 3 f + k runs from corner k + 1 to corner k + 2
-    face, k = np.divmod(np.arange(faces.size), 3)
-    start, stop = 3 * face + (k + 1) % 3, 3 * face + (k + 2) % 3
-    low, high = np.where(ascending, start, stop), np.where(ascending, stop, start)
-    links = np.concatenate([low[left], high[left]]), np.concatenate([low[right], high[right]])
-    graph = coo_array((np.ones(len(links[0]), np.int8), links), shape=(faces.size, faces.size))
+    corners = np.arange(len(edge_of_side), dtype=np.int32).reshape(-1, 3)
+    start, stop = corners[:, [1, 2, 0]].ravel(), corners[:, [2, 0, 1]].ravel()
+    same = ascending[left] == ascending[right]
+    begin, end = start[right], stop[right]
+    links = (
+        np.concatenate([start[left], stop[left]]),
+        np.concatenate([np.where(same, begin, end), np.where(same, end, begin)]),
+    )
+    graph = coo_array((np.ones(len(links[0]), np.int8), links), shape=(corners.size, corners.size))
     return connected_components(graph, directed=False)[1].astype(np.intp)
 
 

@@ -2,9 +2,9 @@
 
     python tests/bench/flatten.py [--data DIR] [--large] [--factorisations]
 
---large adds the brain with every edge cut in two, and that again: 0.4 and 1.5 million triangles. --factorisations compares
-solvers of the brain's Laplacian. libigl, pyamg, qdldl and cholespy are optional (pip); what is absent is left out.
-Times are CPU seconds of one thread (set OMP_NUM_THREADS=1); "x bare" is the time over the bare SuperLU
+--large adds the brain with every edge cut in two, and that again: 0.4 and 1.5 million triangles. --factorisations
+compares solvers of the brain's Laplacian. libigl, pyamg, qdldl and cholespy are optional (pip); what is absent is left
+out. Times are CPU seconds of one thread (set OMP_NUM_THREADS=1); "x bare" is the time over the bare SuperLU
 factorisation of the same Laplacian.
 """
 
