@@ -53,8 +53,13 @@ class Carrier:
     def corners(self, values: Floats) -> tuple[Floats, Booleans]:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
         on_triangles = values[self.source.triangle_corners.ravel()]
-        faces = self.target.mesh.faces
-        carried = interpolate_corners(self.correspondence, self.source.mesh.vertices, on_triangles, faces)
+        carried = interpolate_corners(
+            self.correspondence,
+            self.source.mesh.vertices,
+            on_triangles,
+            self.target.mesh.faces,
+            self.target.corner_polygon[self.target.triangle_corners[:, 0]],
+        )
         carried = carried.reshape(len(carried), *values.shape[1:])
         corners = self.target.triangle_corners.ravel()
         total = len(self.target.corner_vertex)

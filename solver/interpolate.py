@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array
@@ -9,7 +11,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .correspond import Correspondence
-from .mesh import Floats, Integers, directed_edges
+from .mesh import Booleans, Floats, Integers, directed_edges, edges_of_sides, twin_sides
+
+_REACH = 4.0
+"""How much faster than at the two ends a value may change between two points of one side of a seam."""
 
 
 def interpolate(correspondence: Correspondence, values: npt.ArrayLike) -> Floats:
@@ -38,18 +43,78 @@ def value_islands(triangles: Integers, corner_values: Floats) -> Integers:
     corner_values : (3 m, d) float64
         A value per corner of each triangle, as of a UV map.
     """
-    sides = directed_edges(triangles)
-    start = corner_values.reshape(len(triangles), 3, -1)[:, [1, 2, 0]].reshape(len(sides), -1)
-    stop = corner_values.reshape(len(triangles), 3, -1)[:, [2, 0, 1]].reshape(len(sides), -1)
-    turned = sides[:, 0] > sides[:, 1]
-    low, high = np.where(turned[:, None], stop, start), np.where(turned[:, None], start, stop)
-    key = sides.min(axis=1) * (triangles.max() + 1) + sides.max(axis=1)
-    order = np.argsort(key, kind="stable")
-    left, right = order[:-1], order[1:]
-    joined = (key[left] == key[right]) & (low[left] == low[right]).all(axis=1) & (high[left] == high[right]).all(axis=1)
-    links = np.stack([left[joined], right[joined]]) // 3
-    graph = coo_array((np.ones(links.shape[1], np.int8), (links[0], links[1])), shape=(len(triangles),) * 2)
-    return connected_components(graph, directed=False)[1].astype(np.intp)
+    return Charts.of(triangles, corner_values).island
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Where values at the corners of triangles run on continuously, and where they break: along seams.
+
+    Attributes
+    ----------
+    triangles : (m, 3) int
+    values : (m, 3, d) float64
+    neighbours : (m, 3) int
+        The triangle across the side opposite each corner, if the values run on across it; else -1.
+    island : (m,) int
+        Label of the connected part of the triangles.
+    wedge : (m, 3) int
+        Label of the corners around one vertex that have one value and hang together across sides.
+    seam : (n,) bool
+        Whether a vertex has several wedges.
+    slit : (n,) bool
+        Whether several of them lie in one island.
+    """
+
+    triangles: Integers
+    values: Floats
+    neighbours: Integers
+    island: Integers
+    wedge: Integers
+    seam: Booleans
+    slit: Booleans
+
+    @staticmethod
+    def of(triangles: Integers, corner_values: Floats) -> Charts:
+        """Find the charts of values, (3 m, d), at the corners of triangles, (m, 3)."""
+        size, vertex_count = len(triangles), int(triangles.max()) + 1
+        values = corner_values.reshape(size, 3, -1)
+        twin = twin_sides(edges_of_sides(triangles, vertex_count)[1])
+        side = np.flatnonzero(twin > np.arange(len(twin)))
+        other = twin[side]
+        corners = np.arange(3 * size).reshape(size, 3)
+        # the corners at both ends of each side, and those of the triangle beyond it at the same vertices
+        ends, ends_beyond = directed_edges(corners)[side], directed_edges(corners)[other]
+        vertex = triangles.ravel()
+        crossed = vertex[ends[:, 0]] != vertex[ends_beyond[:, 0]]
+        ends_beyond[crossed] = ends_beyond[crossed, ::-1]
+        flat = values.reshape(3 * size, -1)
+        equal = (flat[ends] == flat[ends_beyond]).all(axis=2)
+        wedge = _labels(3 * size, ends[equal], ends_beyond[equal])
+        runs_on = equal.all(axis=1)
+        island = _labels(size, side[runs_on] // 3, other[runs_on] // 3)
+        neighbours = np.full(3 * size, -1)
+        neighbours[side[runs_on]], neighbours[other[runs_on]] = other[runs_on] // 3, side[runs_on] // 3
+        _, first = np.unique(wedge, return_index=True)
+        seam = np.bincount(vertex[first], minlength=vertex_count) > 1
+        pairs, counts = np.unique(vertex[first] * size + island[first // 3], return_counts=True)
+        slit = np.zeros(vertex_count, bool)
+        slit[pairs[counts > 1] // size] = True
+        return Charts(triangles, values, neighbours.reshape(size, 3), island, wedge.reshape(size, 3), seam, slit)
+
+    def wedges_at(self, vertices: Integers) -> tuple[Integers, Integers]:
+        """Return a corner of every wedge at each of some vertices, and the row of `vertices` that it belongs to.
+
+        A wedge that two islands share, which touch in a point of equal value, is there once for each.
+        """
+        key = self.wedge.ravel() * len(self.island) + np.repeat(self.island, 3)
+        _, corner = np.unique(key, return_index=True)
+        corner = corner[np.argsort(self.triangles.ravel()[corner], kind="stable")]
+        around = self.triangles.ravel()[corner]
+        start, stop = np.searchsorted(around, vertices), np.searchsorted(around, vertices, side="right")
+        row = np.repeat(np.arange(len(vertices)), stop - start)
+        offset = np.arange(len(row)) - np.repeat(np.cumsum(stop - start) - (stop - start), stop - start)
+        return corner[start[row] + offset], row
 
 
 def interpolate_corners(
@@ -57,12 +122,14 @@ def interpolate_corners(
     source_vertices: Floats,
     source_corner_values: npt.ArrayLike,
     target_triangles: Integers,
+    groups: Integers | None = None,
 ) -> Floats:
     """Return values at the corners of target triangles, (3 mt, d), from values at the corners of source triangles.
 
-    Each target triangle takes its values from one island of the source (`value_islands`): the one that most of its
-    corners lie in. A corner that lies beyond the island's border takes the nearest value of the island, so that no
-    value is a mean of two islands.
+    All corners of a group take their values from one side of every seam of the source: the side that the group's anchor
+    lies on, the middle of its largest triangle. A corner that lies beyond the seam takes the value at the seam, so that
+    no value is a mean of two sides and no triangle is stretched from one to the other. Between two sides that hang
+    together elsewhere (a slit in one island) a side ends where the value leaves the anchor's faster than it can.
 
     Parameters
     ----------
@@ -72,28 +139,208 @@ def interpolate_corners(
     source_corner_values : (3 ms, d) float
         In the order of `correspondence.source_triangles`.
     target_triangles : (mt, 3) int
+    groups : (mt,) int, optional
+        Which target triangles stay together, as the triangles of one polygon: numbers from 0. By default each is alone.
+
+    Returns
+    -------
+    (3 mt, d) float64
+        0 at corners whose vertex has no counterpart.
     """
     triangles = correspondence.source_triangles
     given = np.asarray(source_corner_values, dtype=np.float64).reshape(3 * len(triangles), -1)
-    island = value_islands(triangles, given)
+    charts = Charts.of(triangles, given)
     corner_vertex = target_triangles.ravel()
-    face, barycentric = correspondence.face[corner_vertex], correspondence.barycentric[corner_vertex].copy()
+    face, weights = correspondence.face[corner_vertex], correspondence.barycentric[corner_vertex]
     known = face >= 0
-    own = np.where(known, island[face], -1).reshape(-1, 3)
-    # the island of two corners, else of the first
-    wanted = np.where(own[:, 1] == own[:, 2], own[:, 1], own[:, 0])
-    wanted = np.where(wanted < 0, own.max(axis=1), wanted)
-    wanted = np.repeat(wanted, 3)
-    astray = np.flatnonzero((wanted >= 0) & known & (island[face] != wanted))
-    if len(astray):
-        place = np.einsum("qk,qkd->qd", barycentric[astray], source_vertices[triangles[face[astray]]])
-        for label in np.unique(wanted[astray]):
-            rows = np.flatnonzero(wanted[astray] == label)
-            members = np.flatnonzero(island == label)
-            corners = triangles[members].ravel()
-            nearest = KDTree(source_vertices[corners]).query(place[rows])[1]
-            face[astray[rows]] = members[nearest // 3]
-            barycentric[astray[rows]] = np.eye(3)[nearest % 3]
-    values = np.einsum("qk,qkd->qd", barycentric, given.reshape(len(triangles), 3, -1)[face])
+    values = np.einsum("qk,qkd->qd", weights, charts.values[face])
     values[~known] = 0
+    if not charts.seam.any():
+        return values
+    group = np.repeat(np.arange(len(target_triangles)) if groups is None else groups, 3)
+    place = np.einsum("qk,qkd->qd", weights, source_vertices[triangles[face]])
+    middle, rank = _middles(place.reshape(-1, 3, 3), known.reshape(-1, 3), group[::3])
+    near_seam = _groups_near_seams(charts, source_vertices, face, known, place, middle, group)
+    chosen = np.flatnonzero(known & near_seam[group])
+    if len(chosen) == 0:
+        return values
+    anchor_face, anchor_value = _anchors(charts, source_vertices, middle, rank, face.reshape(-1, 3), near_seam)
+    its = group[chosen]
+    values[chosen] = _on_side_of_anchor(
+        charts, source_vertices, face[chosen], weights[chosen], place[chosen],
+        anchor_face[its], anchor_value[its], middle[its],
+    )  # fmt: skip
     return values
+
+
+def _labels(size: int, left: Integers, right: Integers) -> Integers:
+    graph = coo_array((np.ones(left.size, np.int8), (left.ravel(), right.ravel())), shape=(size, size))
+    return connected_components(graph, directed=False)[1].astype(np.intp)
+
+
+def _middles(place: Floats, known: Booleans, group: Integers) -> tuple[Floats, Integers]:
+    """Return each group's anchor point, (g, 3), and the triangle whose centroid it is, (g,); -1: nothing is known."""
+    area = np.linalg.norm(np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]), axis=1)
+    # whole triangles first, then those of which some corners are known
+    order = np.lexsort((area, known.sum(axis=1)))
+    triangle = np.full(int(group.max()) + 1, -1)
+    triangle[group[order]] = order
+    triangle[triangle >= 0] = np.where(known[triangle].any(axis=1), triangle, -1)[triangle >= 0]
+    share = known[triangle] / np.maximum(known[triangle].sum(axis=1, keepdims=True), 1)
+    return np.einsum("gk,gkd->gd", share, place[triangle]), triangle
+
+
+def _groups_near_seams(
+    charts: Charts,
+    vertices: Floats,
+    face: Integers,
+    known: Booleans,
+    place: Floats,
+    middle: Floats,
+    group: Integers,
+) -> Booleans:
+    """Return which groups, (g,), lie on a seam, across one or beside a slit."""
+    result = np.zeros(len(middle), bool)
+    rows = np.flatnonzero(known)
+    result[group[rows[charts.seam[charts.triangles[face[rows]]].any(axis=1)]]] = True
+    lowest, highest = np.full(len(middle), len(charts.island)), np.full(len(middle), -1)
+    np.minimum.at(lowest, group[rows], charts.island[face[rows]])
+    np.maximum.at(highest, group[rows], charts.island[face[rows]])
+    result |= lowest < highest
+    if charts.slit.any():
+        radius = np.zeros(len(middle))
+        np.maximum.at(radius, group[rows], np.linalg.norm(place[rows] - middle[group[rows]], axis=1))
+        distance = KDTree(vertices[np.flatnonzero(charts.slit)]).query(middle)[0]
+        result |= distance < radius
+    return result
+
+
+def _anchors(
+    charts: Charts, vertices: Floats, middle: Floats, rank: Integers, face: Integers, wanted: Booleans
+) -> tuple[Integers, Floats]:
+    """Return the source triangle nearest to each wanted group's middle, (g,), and the value there, (g, d)."""
+    groups = np.flatnonzero(wanted & (rank >= 0))
+    query = middle[groups]
+    corners = vertices[charts.triangles]
+    k = min(12, len(corners))
+    near = KDTree(corners.mean(axis=1)).query(query, k=k)[1].reshape(len(query), k)
+    own = face[rank[groups]]
+    candidates = np.concatenate([near, np.where(own < 0, near[:, :1], own)], axis=1)
+    best, best_distance = candidates[:, 0].copy(), np.full(len(query), np.inf)
+    best_weights = np.zeros((len(query), 3))
+    for column in candidates.T:
+        weights = _nearest_weights(corners[column], query)
+        distance = np.linalg.norm(np.einsum("qk,qkd->qd", weights, corners[column]) - query, axis=1)
+        nearer = distance < best_distance
+        best[nearer], best_distance[nearer] = column[nearer], distance[nearer]
+        best_weights[nearer] = weights[nearer]
+    anchor, value = np.full(len(middle), -1), np.zeros((len(middle), charts.values.shape[2]))
+    anchor[groups], value[groups] = best, np.einsum("qk,qkd->qd", best_weights, charts.values[best])
+    return anchor, value
+
+
+def _nearest_weights(corners: Floats, query: Floats) -> Floats:
+    """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, 3), nearest to a query, (q, 3)."""
+    u, v, w = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], query - corners[:, 0]
+    uu, uv, vv, uw, vw = (np.einsum("qd,qd->q", a, b) for a, b in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    area = uu * vv - uv**2
+    second = np.divide(vv * uw - uv * vw, area, out=np.full(len(u), -1.0), where=area > 0)
+    third = np.divide(uu * vw - uv * uw, area, out=np.full(len(u), -1.0), where=area > 0)
+    weights = np.stack([1 - second - third, second, third], axis=1)
+    outside = (weights < 0).any(axis=1)
+    best = np.where(outside, np.inf, 0.0)
+    for k in range(3):
+        start, side = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+        square = np.einsum("qd,qd->q", side, side)
+        along = np.einsum("qd,qd->q", side, query - start)
+        along = np.clip(np.divide(along, square, out=np.zeros(len(u)), where=square > 0), 0, 1)
+        distance = np.linalg.norm(start + along[:, None] * side - query, axis=1)
+        nearer = distance < best
+        best[nearer] = distance[nearer]
+        weights[nearer] = 0
+        weights[nearer, k], weights[nearer, (k + 1) % 3] = 1 - along[nearer], along[nearer]
+    return weights
+
+
+def _on_side_of_anchor(
+    charts: Charts,
+    vertices: Floats,
+    face: Integers,
+    weights: Floats,
+    place: Floats,
+    anchor_face: Integers,
+    anchor_value: Floats,
+    anchor_place: Floats,
+) -> Floats:
+    """Return the values, (q, d), at located points, each on the side of the seams that its anchor lies on."""
+    flat = charts.values.reshape(-1, charts.values.shape[2])
+    wanted = charts.island[anchor_face]
+    corner = _corners_on_side(charts, face, anchor_face, anchor_value)
+    own = 3 * face[:, None] + np.arange(3)
+    wedge = charts.wedge.ravel()
+    right = ((corner >= 0) & (wedge[corner] == wedge[own])) | (weights == 0)
+    at_home = right.all(axis=1) & (charts.island[face] == wanted)
+    # beyond the seam, only what lies on it has a value of the anchor's side
+    kept = np.where((corner >= 0) & (at_home[:, None] | charts.seam[charts.triangles[face]]), weights, 0.0)
+    total = kept.sum(axis=1)
+    found = at_home | (total > 1e-6)
+    kept[~at_home] /= np.maximum(total, 1e-6)[~at_home, None]
+    values = np.einsum("qk,qkd->qd", kept, flat[corner])
+    values[at_home] = np.einsum("qk,qkd->qd", weights[at_home], flat[own[at_home]])
+
+    speed = np.maximum(_speed(charts, vertices, face), _speed(charts, vertices, anchor_face))
+    gap = np.linalg.norm(values - anchor_value, axis=1)
+    reach = _REACH * speed * np.linalg.norm(place - anchor_place, axis=1)
+    beside_slit = at_home & (gap > reach) & (charts.island[face] == wanted)
+    beside_slit &= ~charts.seam[charts.triangles[face]].any(axis=1)
+    far = np.flatnonzero(~found | beside_slit)
+    for label in np.unique(wanted[far]):
+        rows = far[wanted[far] == label]
+        members = np.flatnonzero(charts.island == label)
+        corners = (3 * members[:, None] + np.arange(3)).ravel()
+        corners = corners[np.unique(wedge[corners], return_index=True)[1]]
+        where = vertices[charts.triangles.ravel()[corners]]
+        tree = KDTree(where)
+        # the first of the nearest that is on this side; of more of them only where none is
+        for candidates in (16, 1024):
+            k = min(candidates, len(corners))
+            near = tree.query(place[rows], k=k)[1].reshape(len(rows), k)
+            gap = np.linalg.norm(flat[corners[near]] - anchor_value[rows, None], axis=2)
+            reach = _REACH * speed[rows, None] * np.linalg.norm(where[near] - anchor_place[rows, None], axis=2)
+            within = gap <= reach
+            first = np.where(within.any(axis=1), within.argmax(axis=1), gap.argmin(axis=1))
+            values[rows] = flat[corners[near[np.arange(len(rows)), first]]]
+            rows = rows[~within.any(axis=1)]
+            if len(rows) == 0:
+                break
+    return values
+
+
+def _corners_on_side(charts: Charts, face: Integers, anchor_face: Integers, anchor_value: Floats) -> Integers:
+    """Return for each vertex of some triangles a corner of its wedge on the anchor's side, (q, 3); -1: there is none.
+
+    Of several wedges in the anchor's island the one is taken that its triangle is in, then a neighbour of its triangle,
+    then the one whose value is nearest.
+    """
+    flat = charts.values.reshape(-1, charts.values.shape[2])
+    candidate, row = charts.wedges_at(charts.triangles[face].ravel())
+    query = row // 3
+    around = charts.neighbours[anchor_face]
+    around = np.where(around < 0, anchor_face[:, None], around)
+    wedge = charts.wedge.ravel()[candidate]
+    in_anchor = (charts.wedge[anchor_face][query] == wedge[:, None]).any(axis=1)
+    beside = (charts.wedge[around].reshape(len(face), 9)[query] == wedge[:, None]).any(axis=1)
+    nearness = np.linalg.norm(flat[candidate] - anchor_value[query], axis=1)
+    fits = in_anchor | (charts.island[candidate // 3] == charts.island[anchor_face][query])
+    # np.lexsort sorts by its last key first
+    order = np.lexsort((nearness, ~beside, ~in_anchor, ~fits, row))
+    first = order[np.searchsorted(row[order], np.arange(3 * len(face)))]
+    return np.where(fits[first], candidate[first], -1).reshape(-1, 3)
+
+
+def _speed(charts: Charts, vertices: Floats, face: Integers) -> Floats:
+    """Return how fast the value changes along the sides of triangles, (q,), at most."""
+    sides = vertices[charts.triangles[face]]
+    length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
+    change = np.linalg.norm(charts.values[face] - np.roll(charts.values[face], 1, axis=1), axis=2)
+    return np.divide(change, length, out=np.zeros_like(length), where=length > 0).max(axis=1)
