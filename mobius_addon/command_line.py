@@ -128,6 +128,18 @@ def _parser(prog: str) -> argparse.ArgumentParser:
     flatten = command("flatten", _flatten, "Write a mesh with its map to the unit disc as UV map.")
     flatten.add_argument("mesh", metavar="MESH", help=mesh_help)
     flatten.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
+    flatten.add_argument(
+        "--report", metavar="REPORT.json", type=Path, help="write the distortion and what was repaired"
+    )
+    flatten.add_argument(
+        "--method", choices=("harmonic", "mid-edge"), default="harmonic", help="how to flatten; default: %(default)s"
+    )
+    flatten.add_argument(
+        "--distortion", choices=("dilatation", "factor"), help="write this as the color attribute 'Mobius Distortion'"
+    )
+    repair = flatten.add_argument_group("scans")
+    _add_repair_options(repair)
+    repair.add_argument("--outer", type=int, metavar="VERTEX", help=_OUTER_HELP)
 
     align = command("align", _align, "Find the certified correspondence between two meshes.")
     transfer = command("transfer", _transfer, "Carry what is on the source over to the target.")
@@ -136,11 +148,39 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         added.add_argument("target", metavar="TARGET", help=mesh_help)
         added.add_argument("--map", metavar="MAP.npz", type=Path, help="write the correspondence, array by array")
         added.add_argument("--report", metavar="REPORT.json", type=Path, help="write what was found and proved")
+        repair = added.add_argument_group("scans")
+        _add_repair_options(repair)
+        repair.add_argument("--source-outer", type=int, metavar="VERTEX", help=f"of the source: {_OUTER_HELP}")
+        repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
         _add_align_options(added.add_argument_group("alignment"))
     transfer.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
     transfer.add_argument("--only", metavar="KIND,...", help="carry these only: vertex-groups, colors, uv, attributes")
     transfer.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     return parser
+
+
+_OUTER_HELP = "number, from 0, of a vertex on the outer boundary, for --fill-holes; default: the longest boundary"
+
+
+def _add_repair_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--fill-holes", action="store_true", help="close all boundaries but the outer one for the computation"
+    )
+    group.add_argument(
+        "--largest-part", action="store_true", help="leave all separate parts but the one of largest area out of it"
+    )
+
+
+def _require_outer(vertex: int | None, options: argparse.Namespace, role: str, surface: Surface) -> None:
+    """Raise `Unreadable` if a vertex that was named for the outer boundary cannot be on one."""
+    from .files import Unreadable
+
+    if vertex is None:
+        return
+    if not options.fill_holes:
+        raise Unreadable(f"{role} chooses among the boundaries that --fill-holes finds: give both")
+    if not 0 <= vertex < (count := len(surface.mesh.vertices)):
+        raise Unreadable(f"{role} {vertex}: '{surface.mesh.name}' has the vertices 0 to {count - 1:,}")
 
 
 def _add_align_options(group: argparse._ArgumentGroup) -> None:
@@ -159,6 +199,7 @@ def _align_settings(options: argparse.Namespace) -> AlignSettings:
     from .files import Unreadable
 
     names = ("reflect", "refine", "samples", "targets", "radius", "z_max", "time_limit")
+    names += ("fill_holes", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "time_limit" in given:
         given["time_limit"] = given["time_limit"] or None
@@ -206,25 +247,48 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _flatten(options: argparse.Namespace) -> int:
-    from ..solver import flatten
+    from dataclasses import asdict
+
     from .attributes import DISC_LAYOUT
+    from .computation import Repair, flattened
+    from .distortion_color import MEASURES
     from .files import export_mesh, import_mesh, new_scene, outputs
     from .mesh_data import read_surface
-    from .results import write_layout
+    from .results import DISTORTION_COLOR, require_room, write_color, write_layout
 
-    _require_writable(meshes=[options.output])
+    _require_writable(meshes=[options.output], others=[options.report])
     new_scene()
     obj = import_mesh(options.mesh).obj
     surface = read_surface(obj, options.mesh)
-    flattening = flatten(surface.mesh)
+    measure = next((x for x in MEASURES if x.identifier == options.distortion), None)
+    require_room(obj, [DISC_LAYOUT], [DISTORTION_COLOR] if measure else [])
+    _require_outer(options.outer, options, "--outer", surface)
+    repair = Repair(options.fill_holes, options.largest_part)
+    flattening, notes = flattened(surface.mesh, options.method, repair, outer=options.outer)
     write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+    if measure:
+        write_color(obj, DISTORTION_COLOR, *measure.color(flattening))
+    found = flattening.distortion
     with outputs() as written:
         export_mesh(obj, written.path(options.output))
-    _warn_of_losses(options.output, ["uv"])
-    found = flattening.distortion
+        if options.report:
+            figures = {
+                "mesh": options.mesh,
+                "method": options.method,
+                "distortion": asdict(found),
+                "flips_repaired": flattening.flips_repaired,
+                "holes": [len(loop) for loop in flattening.holes],
+                "warnings": list(notes),
+            }
+            _write_report(written.path(options.report), figures)
+    for note in notes:
+        say_error(f"mobius: warning: {note}")
+    _warn_of_losses(options.output, ["uv", "colors"] if measure else ["uv"])
     say(
         f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
-        f"(median {found.median_angle_error:.2f}°, most {found.max_angle_error:.1f}°), "
+        f"(median {found.median_angle_error:.2f}°, 99 % {found.percentile_99_angle_error:.1f}°, "
+        f"most {found.max_angle_error:.1f}°), "
+        f"dilatation {found.mean_dilatation:.3f} (most {found.max_dilatation:.2f}), "
         f"{found.flips} triangles turned over"
     )
     return DONE
@@ -345,12 +409,13 @@ def _aligned(
     options: argparse.Namespace, surfaces: tuple[Surface, Surface], settings: AlignSettings
 ) -> tuple[Alignment, Correspondence]:
     """Align two surfaces and say what was found."""
-    from ..solver import align, correspond
+    from .computation import aligned
     from .operators.align import summary
 
     source, target = surfaces
-    alignment = align(source.mesh, target.mesh, settings)
-    correspondence = correspond(alignment)
+    _require_outer(settings.source_outer, options, "--source-outer", source)
+    _require_outer(settings.target_outer, options, "--target-outer", target)
+    alignment, correspondence = aligned(source.mesh, target.mesh, settings, largest_part=options.largest_part)
     for warning in alignment.warnings:
         say_error(f"mobius: warning: {warning}")
     say(summary(options.source, options.target, alignment, correspondence))
@@ -389,7 +454,7 @@ def _listed(plan: Transfer) -> list[dict[str, str]]:
 
 
 def _write_report(path: Path, figures: dict[str, Any]) -> None:
-    path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _warn_of_losses(path: Path, kinds: Iterable[str]) -> None:

@@ -4,11 +4,60 @@
 from typing import Any
 
 import bpy
+import numpy as np
 
-from ..solver import AlignSettings
+from ..solver import AlignSettings, TriangleMesh
 from .attributes import KINDS
+from .computation import Repair, selected_loop
+from .mesh_data import foreach
 
 _DEFAULTS = AlignSettings()
+
+
+class ScanOptions:
+    """Mixin with what to do about a scan's flaws; see `computation.Repair`."""
+
+    fill_holes: bpy.props.BoolProperty(
+        name="Fill Holes",
+        description="Accept a mesh with openings, such as a mouth: all but the outer one are closed for the "
+        "computation. The mesh itself stays as it is",
+        default=False,
+    )
+    outer_loop: bpy.props.EnumProperty(
+        name="Outer Boundary",
+        description="Which boundary loop becomes the rim of the disc, where Fill Holes finds several",
+        items=(
+            ("longest", "Longest", "The longest boundary loop"),
+            ("selected", "Selected", "The boundary loop that has selected vertices, as chosen in Edit Mode"),
+        ),
+        default="longest",
+    )
+    largest_part: bpy.props.BoolProperty(
+        name="Largest Part",
+        description="Leave all separate parts but the one of largest area out of the computation",
+        default=False,
+    )
+
+
+SCAN_OPTIONS = tuple(ScanOptions.__annotations__)
+
+
+def repair(options: Any) -> Repair:
+    """Return what to do about a scan's flaws from an object that has `ScanOptions`."""
+    return Repair(options.fill_holes, options.largest_part)
+
+
+def outer_vertex(obj: bpy.types.Object, mesh: TriangleMesh, options: Any) -> int | None:
+    """Return a vertex of the boundary loop that is chosen as the outer one, None for the longest.
+
+    Raises
+    ------
+    Refusal
+        As `computation.selected_loop`.
+    """
+    if not options.fill_holes or options.outer_loop == "longest":
+        return None
+    return selected_loop(mesh, foreach(obj.data.vertices, "select", 1, np.bool_), repair(options))
 
 
 class AlignOptions:
@@ -71,10 +120,16 @@ class AlignOptions:
 ALIGN_OPTIONS = tuple(AlignOptions.__annotations__)
 
 
-def align_settings(options: Any, time_limit: float) -> AlignSettings:
-    """Return the solver's settings from an object that has `AlignOptions`; a radius or time limit of 0 is none."""
+def align_settings(
+    options: Any, time_limit: float, outer: tuple[int | None, int | None] = (None, None)
+) -> AlignSettings:
+    """Return the solver's settings from an object that has `AlignOptions` and `ScanOptions`.
+
+    A radius or time limit of 0 is none; `outer` are vertices on the outer loops of source and target.
+    """
     chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS}
-    return AlignSettings(**chosen | {"radius": options.radius or None, "time_limit": time_limit or None})
+    chosen |= {"radius": options.radius or None, "time_limit": time_limit or None}
+    return AlignSettings(**chosen, fill_holes=options.fill_holes, source_outer=outer[0], target_outer=outer[1])
 
 
 def enum_identifier(kind: str) -> str:

@@ -1,5 +1,7 @@
 """The panel "Möbius" in the sidebar of the 3D viewport."""
 
+from collections.abc import Iterable
+
 import bpy
 
 from . import stored_alignment, topology_cache
@@ -7,7 +9,7 @@ from .operators.align import MOBIUS_OT_align
 from .operators.check import MOBIUS_OT_check
 from .operators.flatten import MOBIUS_OT_flatten
 from .operators.transfer import MOBIUS_OT_transfer
-from .options import ALIGN_OPTIONS
+from .options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from .preferences import preferences
 from .usable import why_not
 
@@ -41,8 +43,8 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             layout.label(text="ESC stops", icon="INFO")
         else:
             operator = layout.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
-            for name in ALIGN_OPTIONS:
-                setattr(operator, name, getattr(settings, name))
+            _hand_on(ALIGN_OPTIONS, settings, operator)
+            _hand_on(SCAN_OPTIONS, settings, operator)
         if settings.source and settings.target and settings.target.type == "MESH":
             _draw_result(layout, settings)
 
@@ -50,7 +52,25 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         layout.column(align=True).prop(settings, "kinds")
         layout.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER").kinds = settings.kinds
         layout.separator()
-        layout.operator(MOBIUS_OT_flatten.bl_idname, icon="UV")
+        _hand_on(SCAN_OPTIONS, settings, layout.operator(MOBIUS_OT_flatten.bl_idname, icon="UV"))
+
+
+class MOBIUS_PT_scans(MobiusPanel, bpy.types.Panel):
+    """What to do about scans that are no clean discs."""
+
+    bl_label = "Scans"
+    bl_parent_id = "MOBIUS_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings."""
+        layout, settings = self.layout, context.scene.mobius
+        layout.use_property_split = True
+        layout.prop(settings, "fill_holes")
+        row = layout.row()
+        row.enabled = settings.fill_holes
+        row.prop(settings, "outer_loop")
+        layout.prop(settings, "largest_part")
 
 
 class MOBIUS_PT_alignment(MobiusPanel, bpy.types.Panel):
@@ -68,6 +88,12 @@ class MOBIUS_PT_alignment(MobiusPanel, bpy.types.Panel):
             layout.prop(context.scene.mobius, name)
 
 
+def _hand_on(names: Iterable[str], settings: bpy.types.PropertyGroup, operator: bpy.types.OperatorProperties) -> None:
+    """Give a button's operator the scene's choices."""
+    for name in names:
+        setattr(operator, name, getattr(settings, name))
+
+
 def _draw_line(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object | None, role: str) -> None:
     """Say under a picker what the chosen mesh is, with a button that selects what is wrong with it."""
     if obj is None:
@@ -79,7 +105,7 @@ def _draw_line(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.
     if kept is not None and not kept.check_while_drawing:
         line = topology_cache.Line((f"{len(obj.data.vertices):,} vertices",), None)
     else:
-        line = topology_cache.line_of(obj)
+        line = topology_cache.line_of(obj, repair(context.scene.mobius))
     icon = {True: "CHECKMARK", False: "ERROR", None: "QUESTION"}[line.is_disc]
     row = layout.row(align=True)
     row.label(text=line.rows[0], icon=icon)
@@ -102,4 +128,4 @@ def _draw_result(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) 
     box.label(text=f"{kept.coverage:.0%} of the vertices{mirrored}, {kept.seconds:.1f} s")
 
 
-register, unregister = bpy.utils.register_classes_factory((MOBIUS_PT_main, MOBIUS_PT_alignment))
+register, unregister = bpy.utils.register_classes_factory((MOBIUS_PT_main, MOBIUS_PT_scans, MOBIUS_PT_alignment))

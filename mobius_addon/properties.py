@@ -4,7 +4,7 @@
 import bpy
 
 from . import topology_cache
-from .options import AlignOptions, TransferOptions
+from .options import AlignOptions, ScanOptions, TransferOptions
 from .usable import is_in_scene
 
 
@@ -12,7 +12,7 @@ def _is_choosable(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> b
     return obj.type == "MESH" and is_in_scene(obj, settings.id_data)
 
 
-class MobiusSettings(AlignOptions, TransferOptions, bpy.types.PropertyGroup):
+class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.PropertyGroup):
     """What a person chose in the panel; one per scene."""
 
     source: bpy.props.PointerProperty(

@@ -1,4 +1,4 @@
-"""What flatten and align write on a mesh for people to see: UV layouts, a color and the group of matched points."""
+"""What flatten and align write on a mesh for people to see: UV layouts, colors and the group of matched points."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from ..solver.mesh import Booleans, Complexes, Floats
 from .attributes import MAX_UV_MAPS, AttributeAccess, VertexGroupAccess
 from .mesh_data import Refusal, Surface
+
+DISTORTION_COLOR = "Mobius Distortion"
 
 _LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
 _COLOR = AttributeAccess("FLOAT_COLOR", "POINT", "color", 4)
@@ -37,6 +39,8 @@ def require_room(obj: bpy.types.Object, layouts: Sequence[str], colors: Sequence
 def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Surface) -> None:
     """Write points of the unit disc, (n,), as a UV map, uv = (disc + 1) / 2, and make it the active one.
 
+    Faces that have no place in the disc, nan, are put into its corner (0, 0), outside the disc.
+
     Raises
     ------
     Refusal
@@ -45,7 +49,8 @@ def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Sur
     require_room(obj, [name])
     render = next((x.name for x in obj.data.uv_layers if x.active_render), None)
     plane = np.stack([disc.real, disc.imag], axis=1) / 2 + 0.5
-    values = plane[surface.corner_vertex]
+    bare = np.bincount(surface.corner_polygon, np.isnan(disc.real)[surface.corner_vertex]) > 0
+    values = np.where(bare[surface.corner_polygon, None], 0.0, plane[surface.corner_vertex])
     _LAYOUT.write(obj, name, values, np.ones(len(values), bool))
     layers = obj.data.uv_layers
     layers.active = layers[name]

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..solver import MeshError, Topology, topology
+from ..solver import MeshError, TriangleMesh, topology
+from ..solver.mesh import plural
+from .computation import Repair, in_order
 from .mesh_data import read_surface
 
 MAX_POLYGONS = 200_000
@@ -33,26 +35,34 @@ class Line:
 _lines: dict[tuple[int, ...], Line] = {}
 
 
-def line_of(obj: bpy.types.Object) -> Line:
-    """Return the line about a mesh object in Object Mode."""
-    key = _key(obj)
+def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
+    """Return the line about a mesh object in Object Mode, with the repairs that flatten and align will do."""
+    key = _key(obj, repair)
     if key not in _lines:
         if len(obj.data.polygons) > MAX_POLYGONS:
             return Line((f"{len(obj.data.vertices):,} vertices, not checked yet",), None)
         try:
-            store(obj, topology(read_surface(obj).mesh))
+            store(obj, read_surface(obj).mesh, repair)
         except MeshError as error:
             _lines[key] = Line(_rows(str(error).removeprefix(f"'{obj.name}' ")), False)
     return _lines[key]
 
 
-def store(obj: bpy.types.Object, found: Topology) -> None:
-    """Keep what has been found about an object's mesh."""
-    problems = found.problems()
-    if problems:
-        _lines[_key(obj)] = Line(tuple(row for problem in problems for row in _rows(problem)), False)
-    else:
-        _lines[_key(obj)] = Line((f"disc, {found.vertices:,} vertices",), True)
+def store(obj: bpy.types.Object, mesh: TriangleMesh, repair: Repair) -> None:
+    """Find out and keep what an object's mesh is."""
+    _lines[_key(obj, repair)] = _line(mesh, repair)
+
+
+def _line(mesh: TriangleMesh, repair: Repair) -> Line:
+    try:
+        found = topology(in_order(mesh, repair).mesh)
+    except MeshError as error:
+        return Line(_rows(str(error).removeprefix(f"'{mesh.name}' ")), False)
+    if problems := found.problems(fill_holes=repair.fill_holes):
+        return Line(tuple(row for problem in problems for row in _rows(problem)), False)
+    openings = len(found.boundary_loops) - 1
+    what = f"disc with {plural(openings, 'opening')}" if openings else "disc"
+    return Line((f"{what}, {found.vertices:,} vertices",), True)
 
 
 def _rows(problem: str) -> tuple[str, ...]:
@@ -60,9 +70,10 @@ def _rows(problem: str) -> tuple[str, ...]:
     return tuple(problem.split(": ", 1))
 
 
-def _key(obj: bpy.types.Object) -> tuple[int, ...]:
+def _key(obj: bpy.types.Object, repair: Repair) -> tuple[int, ...]:
     mesh = obj.data
-    return mesh.session_uid, len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons)
+    counts = len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons)
+    return mesh.session_uid, *counts, repair.fill_holes, repair.largest_part
 
 
 @bpy.app.handlers.persistent

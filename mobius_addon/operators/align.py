@@ -11,14 +11,15 @@ from ... import solver
 from ...solver.mesh import Floats
 from .. import results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT
+from ..computation import aligned
 from ..jobs import JobOperator, Report, Work
 from ..mesh_data import Refusal, read_surface, scale_warning
-from ..options import AlignOptions, align_settings
+from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..usable import why_not_pair
 
 
-class MOBIUS_OT_align(JobOperator, AlignOptions, bpy.types.Operator):
+class MOBIUS_OT_align(JobOperator, AlignOptions, ScanOptions, bpy.types.Operator):
     """Match source and target: both get a shared UV map, corresponding colors and a group of matched points."""
 
     bl_idname = "mobius.align"
@@ -54,12 +55,12 @@ class MOBIUS_OT_align(JobOperator, AlignOptions, bpy.types.Operator):
         limit = self.time_limit
         if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
             limit = kept.time_limit
-        options = align_settings(self, limit)
         source, target = (surface.mesh for surface in self._surfaces)
+        outer = outer_vertex(settings.source, source, self), outer_vertex(settings.target, target, self)
+        options, largest_part = align_settings(self, limit, outer), self.largest_part
 
         def work(report: Report) -> tuple[solver.Alignment, solver.Correspondence]:
-            alignment = solver.align(source, target, options, report)
-            return alignment, solver.correspond(alignment)
+            return aligned(source, target, options, largest_part=largest_part, progress=report)
 
         return work
 

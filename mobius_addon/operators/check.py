@@ -11,6 +11,7 @@ from ...solver import MeshError, Topology, TriangleMesh, topology
 from ...solver.mesh import Booleans
 from .. import topology_cache
 from ..mesh_data import foreach, read_surface
+from ..options import repair
 from ..usable import why_not
 
 
@@ -51,7 +52,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         found = topology(mesh)
-        topology_cache.store(obj, found)
+        topology_cache.store(obj, mesh, repair(context.scene.mobius))
         line = f"'{obj.name}': {found.describe()}"
         if found.is_disc:
             self.report({"INFO"}, line)

@@ -1,20 +1,44 @@
 """Flatten a mesh to the unit disc, as a UV map."""
 
+# no postponed annotations here: Blender reads the properties from them
 import bpy
+import numpy as np
 
-from ... import solver
+from ...solver import MeshError
 from ..attributes import DISC_LAYOUT
+from ..computation import flattened
+from ..distortion_color import MEASURES
 from ..mesh_data import Refusal, read_surface
-from ..results import write_layout
+from ..options import ScanOptions, outer_vertex, repair
+from ..results import DISTORTION_COLOR, require_room, write_color, write_layout
 from ..usable import why_not
 
 
-class MOBIUS_OT_flatten(bpy.types.Operator):
+class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
     """Flatten the active mesh conformally to a disc, as the UV map Mobius Disc."""
 
     bl_idname = "mobius.flatten"
     bl_label = "Flatten to Disc"
     bl_options = {"REGISTER", "UNDO"}
+
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the conformal map is computed",
+        items=(
+            ("harmonic", "Harmonic", "Harmonic measure and extension: the most accurate, on every mesh"),
+            ("mid-edge", "Mid-edge", "Conjugate harmonic functions at the edges' midpoints, as in the literature"),
+        ),
+        default="harmonic",
+    )
+    distortion: bpy.props.EnumProperty(
+        name="Distortion",
+        description=f"What the color attribute '{DISTORTION_COLOR}' shows of the map",
+        items=(
+            ("none", "None", "Write no colors"),
+            *((measure.identifier, measure.label, measure.description) for measure in MEASURES),
+        ),
+        default="none",
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -25,20 +49,30 @@ class MOBIUS_OT_flatten(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Write the UV map."""
+        """Write the UV map and the colors."""
         obj = context.object
+        measure = next((x for x in MEASURES if x.identifier == self.distortion), None)
         try:
+            require_room(obj, [DISC_LAYOUT], [DISTORTION_COLOR] if measure else [])
             surface = read_surface(obj)
-            flattening = solver.flatten(surface.mesh)
-            write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
-        except (Refusal, solver.MeshError) as error:
+            outer = outer_vertex(obj, surface.mesh, self)
+            flattening, notes = flattened(surface.mesh, self.method, repair(self), outer=outer)
+        except (Refusal, MeshError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+        if measure:
+            write_color(obj, DISTORTION_COLOR, *measure.color(flattening))
+        for note in notes:
+            self.report({"WARNING"}, note)
         found = flattening.distortion
         flips = f", {found.flips} triangles turned over" if found.flips else ""
+        colors = f"; its colors are in '{DISTORTION_COLOR}'" if measure else ""
         self.report(
             {"INFO"},
             f"'{obj.name}' is flat in the UV map '{DISC_LAYOUT}': "
-            f"angles are off by {found.mean_angle_error:.1f}° on average{flips}",
+            f"angles are off by {found.mean_angle_error:.1f}° on average (at most {found.max_angle_error:.0f}°), "
+            f"dilatation {found.mean_dilatation:.2f} (at most {found.max_dilatation:.1f}), "
+            f"lengths times {np.exp(found.min_log_factor):.2g} to {np.exp(found.max_log_factor):.2g}{flips}{colors}",
         )
         return {"FINISHED"}

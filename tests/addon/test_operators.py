@@ -9,6 +9,7 @@ from scenes import QUICK, corner_values, everything, make_object, make_sheet, po
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import stored_alignment, topology_cache  # noqa: E402
+from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.usable import why_not  # noqa: E402
 
 
@@ -59,7 +60,7 @@ def test_check_says_disc_and_selects_nothing() -> None:
     before = everything(obj)
     assert bpy.ops.mobius.check() == {"FINISHED"}
     assert everything(obj) == before
-    assert topology_cache.line_of(obj) == topology_cache.Line(("disc, 36 vertices",), True)
+    assert topology_cache.line_of(obj, Repair()) == topology_cache.Line(("disc, 36 vertices",), True)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,19 @@
 """Scans with openings in `align` and `correspond`."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scans import bumps, percent, places, posed, remeshed
 
 from solver import AlignSettings, MeshError, TriangleMesh, align, correspond, topology
 
+Pierced = tuple[TriangleMesh, TriangleMesh, np.ndarray]
 SMALL = AlignSettings(samples=40, targets=300, reflect="never", fill_holes=True)
 
 
 @pytest.fixture(scope="module")
-def pierced():
+def pierced() -> Pierced:
     """A sheet, the same with a round opening, and which of its faces are in that."""
     sheet = bumps(900, seed=2)
     centre = sheet.vertices[sheet.faces].mean(axis=1)
@@ -19,7 +22,7 @@ def pierced():
     return sheet, TriangleMesh(sheet.vertices, sheet.faces[~inside], "Pierced"), inside
 
 
-def test_what_lies_in_an_opening_of_the_source_is_not_matched(pierced):
+def test_what_lies_in_an_opening_of_the_source_is_not_matched(pierced: Pierced) -> None:
     sheet, open_sheet, inside = pierced
     assert len(topology(open_sheet).boundary_loops) == 2
     target, vertex = remeshed(posed(sheet, 1), 0.6, 2)
@@ -34,7 +37,7 @@ def test_what_lies_in_an_opening_of_the_source_is_not_matched(pierced):
     assert (found.face >= 0).all()
 
 
-def test_an_opening_of_the_target_does_no_harm(pierced):
+def test_an_opening_of_the_target_does_no_harm(pierced: Pierced) -> None:
     sheet, open_sheet, _ = pierced
     found = correspond(align(posed(sheet, 1), open_sheet, SMALL))
     used = np.unique(open_sheet.faces)
@@ -42,17 +45,17 @@ def test_an_opening_of_the_target_does_no_harm(pierced):
     assert error.mean() < 1.5
 
 
-def test_openings_are_refused_unless_asked_for(pierced):
+def test_openings_are_refused_unless_asked_for(pierced: Pierced) -> None:
     sheet, open_sheet, _ = pierced
     with pytest.raises(MeshError, match="'Pierced' has 2 boundary loops"):
         align(sheet, open_sheet, AlignSettings(samples=40, targets=300))
 
 
-def test_the_outer_loop_can_be_named(pierced):
+def test_the_outer_loop_can_be_named(pierced: Pierced) -> None:
     sheet, open_sheet, _ = pierced
     inner = topology(open_sheet).boundary_loops[1]
     settings = AlignSettings(samples=12, targets=80, reflect="never", refine="none", fill_holes=True, z_max=0.2)
-    named = align(sheet, open_sheet, AlignSettings(**vars(settings) | {"target_outer": int(inner[0])}))
+    named = align(sheet, open_sheet, replace(settings, target_outer=int(inner[0])))
     assert set(named.target.boundary) == set(inner)
     with pytest.raises(MeshError, match="on none of its boundary loops"):
-        align(sheet, open_sheet, AlignSettings(**vars(settings) | {"target_outer": 10**6}))
+        align(sheet, open_sheet, replace(settings, target_outer=10**6))
