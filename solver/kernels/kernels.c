@@ -771,7 +771,9 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
         while (depth) {
             Open open = stack[--depth];
             if (open.node.bound <= value) continue;
-            if (open.node.half <= p->smallest || spent >= budget || depth + 4 * CLUSTERS * CLUSTERS > STACK) {
+            int64_t most_children = 4 * CLUSTERS * CLUSTERS; /* what follows may push that many */
+            if (open.node.half <= p->smallest || spent >= budget || depth + most_children > STACK ||
+                found + depth + most_children >= left_room) {
                 left[found++] = open.node;
                 continue;
             }
