@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .correspond import Correspondence
-from .mesh import Booleans, Floats, Integers, directed_edges, edges_of_sides, twin_sides
+from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
 
 _REACH = 4.0
 """How much faster than at the two ends a value may change between two points of one side of a seam."""
@@ -173,6 +173,122 @@ def interpolate_corners(
     return values
 
 
+def source_of_faces(
+    correspondence: Correspondence, source_vertices: Floats, target_triangles: Integers, groups: Integers
+) -> Integers:
+    """Return the source triangle in which the middle of each group of target triangles lies, (g,); -1: none is known.
+
+    The middle is that of the group's largest triangle. Arguments are those of `interpolate_corners`.
+    """
+    face, place = _places(correspondence, source_vertices)
+    at = face[target_triangles]
+    middle, rank = _middles(place[target_triangles], at >= 0, groups)
+    result = np.full(len(middle), -1)
+    found = np.flatnonzero(rank >= 0)
+    corners = source_vertices[correspondence.source_triangles]
+    result[found] = _nearest_triangles(corners, middle[found], at[rank[found]])[0]
+    return result
+
+
+def source_of_corners(
+    correspondence: Correspondence, source_vertices: Floats, target_triangles: Integers, groups: Integers
+) -> Integers:
+    """Return the source triangle's corner (3 face + 0, 1 or 2) nearest to each corner of target triangles, (3 mt,).
+
+    The corner is looked for from a tenth of the way to the middle of its group, so that it is found in the face
+    on the same side of the vertex; -1 where the vertex has no counterpart. Arguments are those of `interpolate_corners`.
+    """
+    face, place = _places(correspondence, source_vertices)
+    at = face[target_triangles]
+    middle, _ = _middles(place[target_triangles], at >= 0, groups)
+    query = 0.9 * place[target_triangles.ravel()] + 0.1 * np.repeat(middle[groups], 3, axis=0)
+    result = np.full(len(query), -1)
+    found = np.flatnonzero(at.ravel() >= 0)
+    corners = source_vertices[correspondence.source_triangles]
+    nearest, weights = _nearest_triangles(corners, query[found], at.reshape(-1, 1)[found])
+    result[found] = 3 * nearest + weights.argmax(axis=1)
+    return result
+
+
+def source_of_edges(
+    correspondence: Correspondence, source_vertices: Floats, source_edges: Integers, target_edges: Integers
+) -> Integers:
+    """Return the source edge that runs along each target edge, (et,), from edges as pairs of vertices, (es, 2).
+
+    Of the edges nearby it is the one with the least sum of its distance from the target edge's middle and of what the
+    target edge's length loses by the angle between them; -1 where an end has no counterpart.
+    """
+    face, place = _places(correspondence, source_vertices)
+    result = np.full(len(target_edges), -1)
+    found = np.flatnonzero((face[target_edges] >= 0).all(axis=1))
+    if len(found) == 0 or len(source_edges) == 0:
+        return result
+    start, stop = source_vertices[source_edges[:, 0]], source_vertices[source_edges[:, 1]]
+    begin, end = place[target_edges[found, 0]], place[target_edges[found, 1]]
+    query, run = (begin + end) / 2, end - begin
+    length = np.linalg.norm(run, axis=1)
+    k = min(16, len(source_edges))
+    near = KDTree((start + stop) / 2).query(query, k=k)[1].reshape(len(query), k)
+    best_cost = np.full(len(query), np.inf)
+    for column in near.T:
+        side = stop[column] - start[column]
+        square = np.einsum("qd,qd->q", side, side)
+        along = np.einsum("qd,qd->q", side, query - start[column])
+        along = np.clip(np.divide(along, square, out=np.zeros(len(query)), where=square > 0), 0, 1)
+        distance = np.linalg.norm(start[column] + along[:, None] * side - query, axis=1)
+        cosine = np.abs(np.einsum("qd,qd->q", side, run))
+        cosine = np.divide(cosine, np.sqrt(square) * length, out=np.ones(len(query)), where=square * length > 0)
+        cost = distance + length * (1 - cosine)
+        better = cost < best_cost
+        best_cost[better] = cost[better]
+        result[found[better]] = column[better]
+    return result
+
+
+def _places(correspondence: Correspondence, source_vertices: Floats) -> tuple[Integers, Floats]:
+    """Return each target vertex's source triangle, (n,), and its place on the source, (n, 3)."""
+    corners = source_vertices[correspondence.source_triangles[correspondence.face]]
+    return correspondence.face, np.einsum("qk,qkd->qd", correspondence.barycentric, corners)
+
+
+def local_similarities(
+    correspondence: Correspondence, source: TriangleMesh, target: TriangleMesh
+) -> tuple[Floats, Floats]:
+    """Return how directions and lengths around each target vertex come from the source: (n, 3, 3) and (n,).
+
+    The orthogonal matrix is the one that turns the sides of the triangles around a vertex, and the normal, best from
+    the source onto the target (Kabsch 1976); a reflection everywhere if the map mirrors the surface, else nowhere.
+    The scale is the ratio of the lengths of those sides. Both are the identity where nothing is known.
+    """
+    face, place = _places(correspondence, source.vertices)
+    sides = directed_edges(target.faces)
+    sides = sides[(face[sides] >= 0).all(axis=1)]
+    there = place[sides[:, 1]] - place[sides[:, 0]]
+    here = target.vertices[sides[:, 1]] - target.vertices[sides[:, 0]]
+    size = len(face)
+    ends = sides.T.ravel()
+    gather = coo_array(
+        (np.ones(len(ends)), (ends, np.tile(np.arange(len(sides)), 2))), shape=(size, len(sides))
+    ).tocsr()
+    product = (gather @ (here[:, :, None] * there[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
+    there_square, here_square = (gather @ np.einsum("ed,ed->e", x, x) for x in (there, here))
+    there_normal = interpolate(correspondence, source.vertex_normals())
+    there_normal /= np.maximum(np.linalg.norm(there_normal, axis=1, keepdims=True), 1e-300)
+    weight = np.sqrt(there_square * here_square)[:, None, None]
+    product += weight * target.vertex_normals()[:, :, None] * there_normal[:, None, :]
+    product[weight[:, 0, 0] == 0] = np.eye(3)
+    left, _, right = np.linalg.svd(product)
+    handed = np.sign(np.linalg.det(left @ right))
+    mirrored = np.sign(handed[weight[:, 0, 0] > 0].sum() or 1)
+    left[handed != mirrored, :, 2] *= -1
+    rotation = left @ right
+    rotation[weight[:, 0, 0] == 0] = np.eye(3)
+    scale = np.ones(size)
+    known = (there_square > 0) & (here_square > 0)
+    scale[known] = np.sqrt(here_square[known] / there_square[known])
+    return rotation, scale
+
+
 def _labels(size: int, left: Integers, right: Integers) -> Integers:
     graph = coo_array((np.ones(left.size, np.int8), (left.ravel(), right.ravel())), shape=(size, size))
     return connected_components(graph, directed=False)[1].astype(np.intp)
@@ -220,12 +336,20 @@ def _anchors(
 ) -> tuple[Integers, Floats]:
     """Return the source triangle nearest to each wanted group's middle, (g,), and the value there, (g, d)."""
     groups = np.flatnonzero(wanted & (rank >= 0))
-    query = middle[groups]
-    corners = vertices[charts.triangles]
+    best, weights = _nearest_triangles(vertices[charts.triangles], middle[groups], face[rank[groups]])
+    anchor, value = np.full(len(middle), -1), np.zeros((len(middle), charts.values.shape[2]))
+    anchor[groups], value[groups] = best, np.einsum("qk,qkd->qd", weights, charts.values[best])
+    return anchor, value
+
+
+def _nearest_triangles(corners: Floats, query: Floats, guesses: Integers) -> tuple[Integers, Floats]:
+    """Return the triangle of (m, 3, 3) nearest to each query, (q,), and the barycentric coordinates, (q, 3), in it.
+
+    Tried are the guesses, (q, h), -1 for none, and the triangles whose middles are nearest.
+    """
     k = min(12, len(corners))
     near = KDTree(corners.mean(axis=1)).query(query, k=k)[1].reshape(len(query), k)
-    own = face[rank[groups]]
-    candidates = np.concatenate([near, np.where(own < 0, near[:, :1], own)], axis=1)
+    candidates = np.concatenate([near, np.where(guesses < 0, near[:, :1], guesses)], axis=1)
     best, best_distance = candidates[:, 0].copy(), np.full(len(query), np.inf)
     best_weights = np.zeros((len(query), 3))
     for column in candidates.T:
@@ -234,9 +358,7 @@ def _anchors(
         nearer = distance < best_distance
         best[nearer], best_distance[nearer] = column[nearer], distance[nearer]
         best_weights[nearer] = weights[nearer]
-    anchor, value = np.full(len(middle), -1), np.zeros((len(middle), charts.values.shape[2]))
-    anchor[groups], value[groups] = best, np.einsum("qk,qkd->qd", best_weights, charts.values[best])
-    return anchor, value
+    return best, best_weights
 
 
 def _nearest_weights(corners: Floats, query: Floats) -> Floats:

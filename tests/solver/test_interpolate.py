@@ -3,7 +3,7 @@ import pytest
 from surfaces import planar, rings
 
 from solver import Correspondence, TriangleMesh, interpolate, interpolate_corners
-from solver.interpolate import value_islands
+from solver.interpolate import local_similarities, source_of_corners, source_of_edges, source_of_faces, value_islands
 from solver.locate import TriangulatedDisc
 
 
@@ -193,3 +193,44 @@ def test_a_corner_without_counterpart_does_not_choose_the_side():
     assert (carried[gone] == 0).all()
     whole_quads = np.repeat(~gone.reshape(-1, 6).any(axis=1), 6)
     assert (carried[whole_quads] == given[whole_quads]).all()
+
+
+def test_faces_corners_and_edges_of_an_identical_mesh_are_their_own_source():
+    mesh, quad = sheet(17)
+    found = on_itself(mesh, 3)
+    assert (source_of_faces(found, mesh.vertices, mesh.faces, quad) // 2 == np.arange(256)).all()
+    alone = np.arange(len(mesh.faces))
+    assert (source_of_faces(found, mesh.vertices, mesh.faces, alone) == alone).all()
+    corner = source_of_corners(found, mesh.vertices, mesh.faces, quad)
+    assert (mesh.faces.ravel()[corner] == mesh.faces.ravel()).all()
+    assert (quad[corner // 3] == np.repeat(quad, 3)).all()
+    edges = np.unique(
+        np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])), axis=0
+    )
+    assert (source_of_edges(found, mesh.vertices, edges, edges) == np.arange(len(edges))).all()
+
+
+def test_a_target_edge_takes_the_source_edge_that_runs_along_it(pair):
+    source, _ = sheet(41)
+    target, _ = sheet(14, 13)
+    edges = [np.unique(np.sort(m.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0) for m in (source, target)]
+    found = source_of_edges(planar_correspondence(source, target), source.vertices, *edges)
+    run = [m.vertices[e[:, 1]] - m.vertices[e[:, 0]] for m, e in zip((source, target), edges, strict=True)]
+    middle = [m.vertices[e].mean(axis=1) for m, e in zip((source, target), edges, strict=True)]
+    cosine = np.abs((run[0][found] * run[1]).sum(axis=1)) / np.prod(
+        [np.linalg.norm(x, axis=1) for x in (run[0][found], run[1])], axis=0
+    )
+    assert cosine.min() > 0.99
+    assert np.linalg.norm(middle[0][found] - middle[1], axis=1).max() < 0.06
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_the_local_similarity_of_a_similar_surface_is_the_similarity(mirror):
+    flat, _ = sheet(15)
+    source = TriangleMesh(flat.vertices + [0, 0, 1] * np.sin(2 * flat.vertices[:, :1]), flat.faces)
+    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    turn *= mirror * np.sign(np.linalg.det(turn))
+    target = TriangleMesh(2.5 * source.vertices @ turn.T + [1, 2, 3], source.faces[:, ::mirror])
+    rotation, scale = local_similarities(on_itself(source, 0), source, target)
+    assert np.abs(rotation - turn).max() < 1e-9
+    assert scale == pytest.approx(2.5)
