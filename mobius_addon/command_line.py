@@ -179,7 +179,8 @@ def _require_outer(vertex: int | None, options: argparse.Namespace, role: str, s
         return
     if not options.fill_holes:
         raise Unreadable(f"{role} chooses among the boundaries that --fill-holes finds: give both")
-    if not 0 <= vertex < (count := len(surface.mesh.vertices)):
+    count = len(surface.mesh.vertices)
+    if not 0 <= vertex < count:
         raise Unreadable(f"{role} {vertex}: '{surface.mesh.name}' has the vertices 0 to {count - 1:,}")
 
 
