@@ -10,9 +10,13 @@ from ..matching import Matching
 from .compiled import CompiledKernels, library
 from .reference import ReferenceKernels
 
+MOST_POINTS = 1 << 16
+"""Source points that the compiled kernels' counters of sixteen bits cannot count; more run in numpy."""
+
 __all__ = ["CompiledKernels", "ReferenceKernels", "kernels_for"]
 
 
 def kernels_for(problem: Matching, z_max: float, smallest: float) -> CompiledKernels | ReferenceKernels:
     """Return the fastest kernels there are for a matching, for |z| <= z_max and cells of half side >= smallest."""
-    return (ReferenceKernels if library() is None else CompiledKernels)(problem, z_max, smallest)
+    compiled = len(problem.source) < MOST_POINTS and library() is not None
+    return (CompiledKernels if compiled else ReferenceKernels)(problem, z_max, smallest)

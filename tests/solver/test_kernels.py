@@ -234,3 +234,8 @@ def test_a_library_of_another_interface_is_not_used(monkeypatch, caplog):
     finally:
         monkeypatch.undo()
         compiled.library.cache_clear()
+
+
+def test_more_points_than_the_counters_hold_run_in_numpy():
+    many = np.full(1 << 16, 0.1 + 0j)
+    assert isinstance(kernels_for(matching(many, [0.2], 0.1), 0.5, SMALLEST_CELL), ReferenceKernels)
