@@ -10,7 +10,7 @@ from solver import TriangleMesh, flatten
 from solver.descriptors import diffused_mean_curvature
 from solver.sampling import extrema, farthest_points
 
-from .data import DATA, absent, read_obj
+from .data import DATA, absent, read
 from .surfaces import Pair, Side, moved
 from .surfaces import run as run_pairs
 
@@ -62,17 +62,17 @@ def run(folder: Path, sizes: list[int], jobs: int) -> None:
         facts = json.loads((DATA / "faces_ict/ict_ground_truth.json").read_text(encoding="utf-8"))
         named = np.array(facts["eval13"])
         for a, b in ICT:
-            source = thinned(read_obj(f"faces_ict/ict_{a}.obj"), named, len(pairs))
-            target = read_obj(f"faces_ict/ict_{b}.obj"), named
+            source = thinned(read(f"faces_ict/ict_{a}.obj"), named, len(pairs))
+            target = read(f"faces_ict/ict_{b}.obj"), named
             pairs.append(Pair(f"{a}-{b}", moved(side(*source), len(pairs)), side(*target)))
     if reason := absent("faces_simpop/SIMPOP_01.obj"):
         print(f"SIMPOP faces skipped: {reason}")
     else:
         for a, b in SIMPOP:
-            whole = read_obj(f"faces_simpop/SIMPOP_{a}.obj")
+            whole = read(f"faces_simpop/SIMPOP_{a}.obj")
             spread = farthest_points(whole, 13, np.empty(0, np.intp), _away_from_rim(whole))
             source = thinned(whole, spread, len(pairs))
-            target = read_obj(f"faces_simpop/SIMPOP_{b}.obj"), spread
+            target = read(f"faces_simpop/SIMPOP_{b}.obj"), spread
             pairs.append(Pair(f"SIMPOP {a}-{b}", moved(side(*source), len(pairs)), side(*target)))
     if pairs:
         run_pairs("faces", pairs, NOTE, folder, sizes, jobs)

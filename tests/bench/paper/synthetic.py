@@ -56,7 +56,9 @@ def silhouette() -> tuple[Flattening, str]:
         shape, name = body | cabin | wheels[0] | wheels[1], f"a stand-in drawn in code, as {reason}"
     else:
         shape, name = read_gif(DATA / SILHOUETTE) > 127, SILHOUETTE
-    return flatten(silhouette_mesh(shape, 2000), "circle-packing"), name
+    return flatten(
+        silhouette_mesh(shape, 2000, Path(SILHOUETTE).stem if not reason else "stand-in"), "circle-packing"
+    ), name
 
 
 def drawn(setting: Setting) -> tuple[Problem, Mobius, np.ndarray]:

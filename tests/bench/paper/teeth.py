@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .data import DATA, absent, read_obj
+from .data import DATA, absent, read
 from .surfaces import Pair, Side, centred, moved
 from .surfaces import run as run_pairs
 
@@ -20,7 +20,7 @@ NOTE = (
 def side(name: str, mirrored: bool) -> Side:
     """Read a tooth as its authors flattened and sampled it."""
     facts = json.loads((DATA / "teeth/landmarks.json").read_text(encoding="utf-8"))[name]
-    mesh = read_obj(f"teeth/{name}.obj")
+    mesh = read(f"teeth/{name}.obj")
     x, y = np.load(DATA / f"teeth/{name}_disc.npy").reshape(len(mesh.vertices), 2).T
     disc = x + 1j * y
     disc = centred(disc / np.maximum(1, np.abs(disc)), mesh)
