@@ -218,15 +218,17 @@ def run(folder: Path, sizes: list[int], trials: int, jobs: int) -> None:
     ]
     table = averaged(rows, ["objective", "noise", "outliers", "N", "method"], mean)
     summary = averaged(rows, ["objective", "N", "method"], ["share_of_optimum", "error", "right", "seconds"])
+    overall = averaged(rows, ["objective", "method"], ["share_of_optimum", "right"])
     text = [
         f"Silhouette: {name}\neps = sigma = {EPSILON}; {trials} instances of each setting, means.\n{quoted.NOTE}\n",
-        as_text(summary, "All noise and outlier levels together (right: the median inlier is off by less than 0.05)"),
+        as_text(overall, "All settings together (right: the median inlier is off by less than 0.05)"),
+        as_text(summary, "All noise and outlier levels together"),
         as_text(table, "Each setting"),
         as_text(times, f"Run times, {plain}, 25 % outliers"),
         as_text(collapse, f"The optimum under a bound on |z|, {plain}, 25 % outliers"),
     ]
     (folder / "synthetic.txt").write_text("\n".join(text), encoding="utf-8")
-    print("\n".join([text[0], text[1], text[3], text[4]]))
+    print("\n".join([*text[:3], *text[4:]]))
     figures.run_times(folder / "synthetic_times.png", summary, times)
     shown = Setting(INVARIANT, plain, 0.25, max(sizes))
     problem, planted, good = drawn(shown)
