@@ -154,7 +154,7 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
         _add_align_options(added.add_argument_group("alignment"))
     transfer.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
-    transfer.add_argument("--only", metavar="KIND,...", help="carry these only: vertex-groups, colors, uv, attributes")
+    transfer.add_argument("--only", metavar="KIND,...", help="carry these only; one unknown lists all")
     transfer.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     return parser
 

@@ -15,6 +15,7 @@ import addon_utils
 import bmesh
 import numpy as np
 
+from .attributes import KINDS
 from .mesh_data import Refusal, foreach
 
 
@@ -96,13 +97,13 @@ def _save_gltf(path: str) -> None:
     _operator("export_scene.gltf", "io_scene_gltf2")(filepath=path, use_selection=True, export_format=form)
 
 
-_BLEND = Format(_load_blend, _save_blend, frozenset({"vertex-groups", "colors", "uv", "attributes"}))
+_BLEND = Format(_load_blend, _save_blend, frozenset(kind.identifier for kind in KINDS))
 _OBJ = Format(
     lambda path: bpy.ops.wm.obj_import(filepath=path),
     lambda path: bpy.ops.wm.obj_export(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors=True, path_mode="COPY"
     ),
-    frozenset({"colors", "uv"}),
+    frozenset({"colors", "uv", "smoothness"}),
 )
 _PLY = Format(
     lambda path: bpy.ops.wm.ply_import(filepath=path),

@@ -32,12 +32,15 @@ class Surface:
         Vertex of each face corner.
     corner_polygon : (c,) int
         Polygon of each face corner.
+    edges : (e, 2) int
+        Vertices of each of Blender's edges.
     """
 
     mesh: TriangleMesh
     triangle_corners: Integers
     corner_vertex: Integers
     corner_polygon: Integers
+    edges: Integers
 
     def fingerprint(self) -> str:
         """Return a hash of vertices and triangles, which any edit of the shape changes."""
@@ -79,7 +82,8 @@ def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
         vertices[:, 0] *= -1
         corners = corners[:, ::-1]
     triangles = TriangleMesh(vertices, corner_vertex[corners], name or obj.name)
-    return Surface(triangles, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon)
+    edges = foreach(mesh.edges, "vertices", 2, np.int32).astype(np.intp)
+    return Surface(triangles, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon, edges)
 
 
 def is_mirrored(obj: bpy.types.Object) -> bool:

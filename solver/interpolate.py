@@ -196,7 +196,7 @@ def source_of_corners(
     """Return the source triangle's corner (3 face + 0, 1 or 2) nearest to each corner of target triangles, (3 mt,).
 
     The corner is looked for from a tenth of the way to the middle of its group, so that it is found in the face
-    on the same side of the vertex; -1 where the vertex has no counterpart. Arguments are those of `interpolate_corners`.
+    on the same side of the vertex; -1 where the vertex has no counterpart. Arguments as for `interpolate_corners`.
     """
     face, place = _places(correspondence, source_vertices)
     at = face[target_triangles]

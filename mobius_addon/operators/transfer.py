@@ -11,7 +11,7 @@ from ..usable import why_not_pair
 
 
 class MOBIUS_OT_transfer(TransferOptions, bpy.types.Operator):
-    """Carry vertex groups, colors, UV maps and attributes from the source to the target through their alignment."""
+    """Carry everything that is on the source, of the chosen kinds, to the target through their alignment."""
 
     bl_idname = "mobius.transfer"
     bl_label = "Transfer"

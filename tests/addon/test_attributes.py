@@ -20,7 +20,15 @@ from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noq
 from mobius_extension.solver import Correspondence  # noqa: E402
 
 ALL = [kind.identifier for kind in KINDS]
-ATTRIBUTE_ROWS = [row for row in ROWS if isinstance(row.access, AttributeAccess)]
+GENERAL_ROWS = [row for row in ROWS if isinstance(row.access, AttributeAccess) and not row.access.only]
+KNOWN_TYPES = {item.identifier for item in bpy.types.Attribute.bl_rna.properties["data_type"].enum_items}
+EVERY_ROW = [row for row in GENERAL_ROWS if row.access.data_type in KNOWN_TYPES]
+ATTRIBUTE_ROWS = [
+    row
+    for row in EVERY_ROW
+    if row.access.domain in ("POINT", "CORNER")
+    and row.access.data_type in ("FLOAT", "FLOAT2", "FLOAT_VECTOR", "FLOAT4", "FLOAT_COLOR", "BYTE_COLOR")
+]
 
 
 def flat(x: np.ndarray, y: np.ndarray) -> np.ndarray:

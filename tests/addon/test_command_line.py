@@ -163,9 +163,10 @@ def test_transfer_carries_everything_into_a_blend(scans: Path, capsys: pytest.Ca
     arguments = ["-o", out_file, "--report", scans / "r.json", "--map", scans / "m.npz", *QUICK]
     status, out, err = run(capsys, "transfer", scans / "source.blend", scans / "target.obj", *arguments)
     assert (status, err) == (0, "")
-    assert f"{out_file}: 1 vertex group, 1 UV map from {scans / 'source.blend'}" in out
+    assert f"{out_file}: 1 vertex group, 1 UV map, 1 smooth flag from {scans / 'source.blend'}" in out
     assert json.loads((scans / "r.json").read_text())["transferred"] == [
         {"kind": "vertex-groups", "source": "Right", "target": "Right"},
+        {"kind": "smoothness", "source": "sharp_face", "target": "sharp_face"},
         {"kind": "uv", "source": "UVMap", "target": "UVMap"},
     ]
     bpy.ops.wm.open_mainfile(filepath=str(out_file))
