@@ -243,3 +243,17 @@ def test_byte_colors_survive_bit_for_bit() -> None:
     transfer(source, target, ["colors"])
     arrived = np.array([value.color_srgb[:] for value in target.data.color_attributes["Paint"].data])
     assert (np.rint(arrived * 255) == stored).all()
+
+
+def test_groups_made_anew_keep_their_place_and_the_active_one_stays_active() -> None:
+    source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
+    source.vertex_groups.new(name="B").add(range(36), 0.375, "REPLACE")
+    for name in "ABCD":
+        target.vertex_groups.new(name=name).add((1, 2), 0.5, "REPLACE")
+    target.vertex_groups.active_index = 2
+    transfer(source, target, ["vertex-groups"])
+    assert [group.name for group in target.vertex_groups] == ["A", "B", "C", "D"]
+    assert target.vertex_groups.active.name == "C"
+    assert weights(target, "B").tolist() == [0.375] * 36
+    for name in "ACD":
+        assert weights(target, name).tolist() == [0, 0.5, 0.5] + [0] * 33
