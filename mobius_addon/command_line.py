@@ -186,7 +186,7 @@ def _require_outer(vertex: int | None, options: argparse.Namespace, role: str, s
 
 def _add_align_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--reflect", choices=("auto", "never", "always"), help="is one the mirror image of the other?")
-    group.add_argument("--refine", choices=("mobius", "none"), help="improve the proven map on all vertices, or not")
+    group.add_argument("--refine", choices=("dense", "mobius", "none"), help="what follows the proven map")
     group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
     group.add_argument("--targets", type=int, metavar="N", help="target points of the search")
     group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")

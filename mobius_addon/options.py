@@ -77,6 +77,7 @@ class AlignOptions:
         name="Refinement",
         description="How the map that the search proved best is improved",
         items=(
+            ("dense", "Dense", "The target is then bent onto the source, without folds: the most accurate"),
             ("mobius", "Möbius", "The best conformal map nearby, tuned on all vertices"),
             ("none", "None", "Exactly the map of the certificate"),
         ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from .descriptors import diffused_mean_curvature, standardised
 from .flatten import Flattening, flatten
 from .mesh import Complexes, Floats, Integers, TriangleMesh
 from .mobius import Mobius, hyperbolic_distance
+from .nonrigid import Bending, bent
 from .refine import refined
 from .sampling import extrema, farthest_points
 from .search import SearchProgress, SearchResult, search
@@ -46,7 +48,8 @@ class AlignSettings:
     time_limit : float, optional
         Seconds for each search.
     refine : str
-        "none": the search's transformation; "mobius": improved on all vertices.
+        "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
+        the source, smoothly and without folds.
     fill_holes : bool
         Allow meshes with openings: all boundary loops but the outer one are closed for the computation.
     source_outer, target_outer : int, optional
@@ -62,13 +65,13 @@ class AlignSettings:
     reflect: str = "auto"
     reflect_margin: float = 0.06
     time_limit: float | None = 60.0
-    refine: str = "mobius"
+    refine: str = "dense"
     fill_holes: bool = False
     source_outer: int | None = None
     target_outer: int | None = None
 
     def __post_init__(self) -> None:
-        for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius"))):
+        for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius", "dense"))):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{getattr(self, name)}'")
         if self.samples < 3 or self.targets < 3:
@@ -108,6 +111,8 @@ class Alignment:
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of all vertices.
     settings : AlignSettings
+    bending : Bending or None
+        Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not.
     margin : float or None
         By how much of the samples the chosen orientation beat the other; None if only one was searched.
     seconds : dict of str to float
@@ -125,9 +130,20 @@ class Alignment:
     source_descriptors: Floats
     target_descriptors: Floats
     settings: AlignSettings
+    bending: Bending | None = None
     margin: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def carried(self) -> Complexes:
+        """Where each target vertex goes in the source's disc, (n_target,); nan at vertices in no face."""
+        if self.bending is not None:
+            return self.bending.carried
+        places = self.target.disc.copy()
+        used = np.isfinite(places.real)
+        places[used] = self.mobius.inverse()(places[used])
+        return places
 
 
 def align(
@@ -174,8 +190,12 @@ def align(
     )
     mobius = found.mobius
     if settings.refine != "none":
-        clock.begin("refine", "Refining", 0.9)
+        clock.begin("refine", "Refining", 0.8)
         mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings.descriptor_scale)
+    bending = None
+    if settings.refine == "dense":
+        clock.begin("bend", "Bending", 0.85)
+        bending = bent(mobius, source, target, clock.within(0.85, 1.0))
     clock.end()
     if not found.certified:
         share = 100 * found.gap / max(found.upper_bound, 1e-300)
@@ -190,6 +210,7 @@ def align(
         source_descriptors=source_descriptors,
         target_descriptors=target_descriptors,
         settings=settings,
+        bending=bending,
         margin=margin,
         seconds=clock.seconds,
         warnings=tuple(warnings),
@@ -234,7 +255,7 @@ def _searched(
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
-        begin = 0.3 + 0.6 * position / len(sides)
+        begin = 0.3 + 0.5 * position / len(sides)
         clock.begin(
             "search reflected" if reflected else "search",
             "Searching the reflection" if reflected else "Searching",
@@ -247,7 +268,7 @@ def _searched(
             weights=weights,
             z_max=settings.z_max,
             time_limit=settings.time_limit,
-            progress=clock.searching(0.6 / len(sides)),
+            progress=clock.searching(0.5 / len(sides)),
         )
         if result.cancelled:
             raise Cancelled
@@ -281,7 +302,14 @@ class _Stages:
     def begin(self, key: str, text: str, fraction: float) -> None:
         self.end()
         self._key, self._text, self._fraction, self._since = key, text, fraction, time.perf_counter()
-        if self.progress is not None and self.progress(Progress(text, fraction)) is False:
+        self._tell(fraction)
+
+    def within(self, begin: float, end: float) -> Callable[[float], None]:
+        """Return what turns shares of the present stage's work into progress; it may raise `Cancelled`."""
+        return lambda share: self._tell(begin + share * (end - begin))
+
+    def _tell(self, fraction: float) -> None:
+        if self.progress is not None and self.progress(Progress(self._text, fraction)) is False:
             raise Cancelled
 
     def end(self) -> None:

@@ -55,13 +55,13 @@ def correspond(alignment: Alignment) -> Correspondence:
     The vertex's place in the target's disc is taken back by the inverse transformation and located in the source's. One
     that comes to lie in an opening of the source takes the nearest point of its rim, with a confidence of 0.
     """
-    source, target, back = alignment.source, alignment.target, alignment.mobius.inverse()
+    source, target = alignment.source, alignment.target
     size = len(target.disc)
     used = np.flatnonzero(np.isfinite(target.disc.real))
     disc = TriangulatedDisc.of(source.disc, source.mesh.faces)
     face = np.full(size, -1)
     barycentric = np.zeros((size, 3))
-    places = back(target.disc[used])
+    places = alignment.carried[used]
     face[used], barycentric[used] = disc.locate(places)
     confidence = np.zeros(size)
     confidence[used] = _confidence(alignment, face[used], barycentric[used], used)
@@ -101,8 +101,6 @@ def _log_stretch(alignment: Alignment, corners: Integers, barycentric: Floats, u
     """Return the log of the length ratio of the map at target vertices, relative to its median, (q,)."""
     source, target = alignment.source, alignment.target
     source_factor = log_conformal_factor(source.mesh, source.disc)
-    target_factor = log_conformal_factor(target.mesh, target.disc)[used]
-    carried = np.einsum("qk,qk->q", barycentric, source_factor[corners])
-    middle = np.einsum("qk,qk->q", barycentric, source.disc[corners])
-    log_ratio = carried + np.log(alignment.mobius.derivative(middle)) - target_factor
+    carried_factor = log_conformal_factor(target.mesh, alignment.carried)[used]
+    log_ratio = np.einsum("qk,qk->q", barycentric, source_factor[corners]) - carried_factor
     return log_ratio - np.median(log_ratio)

@@ -56,7 +56,8 @@ class Mobius:
         x = np.asarray(x, dtype=np.complex128)
         if self.reflected:
             x = np.conj(x)
-        return np.exp(1j * self.theta) * (x - self.z) / (1 - x * np.conj(self.z))
+        with np.errstate(invalid="ignore"):  # nan (a vertex in no face) stays nan
+            return np.exp(1j * self.theta) * (x - self.z) / (1 - x * np.conj(self.z))
 
     def conjugate(self) -> Mobius:
         """Return x -> conj(f(conj(x))), with the same `reflected`."""

@@ -95,7 +95,7 @@ def _shape(key: bpy.types.ShapeKey) -> Floats:
 
 
 def _mirrored(obj: bpy.types.Object, vectors: Values) -> Floats:
-    return vectors * np.array([-1.0 if is_mirrored(obj) else 1.0, 1.0, 1.0])
+    return np.asarray(vectors * np.array([-1.0 if is_mirrored(obj) else 1.0, 1.0, 1.0]), dtype=np.float64)
 
 
 def _slider(keys: bpy.types.Key, key: bpy.types.ShapeKey) -> Slider:

@@ -93,7 +93,7 @@ def write_alignment(
     """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
     carried = alignment.mobius(alignment.source.disc)
     results.write_layout(source, SHARED_LAYOUT, carried, surfaces[0])
-    results.write_layout(target, SHARED_LAYOUT, alignment.target.disc, surfaces[1])
+    results.write_layout(target, SHARED_LAYOUT, alignment.mobius(alignment.carried), surfaces[1])
     used = np.isfinite(carried)
     color = results.disc_color(np.where(used, carried, 0))
     results.write_color(source, SHARED_COLOR, color, used)

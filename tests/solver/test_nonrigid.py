@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+from scans import bumps, mirrored, percent, posed, remeshed
+
+from solver import Flattening, Mobius, TriangleMesh, flatten
+from solver.distortion import signed_areas
+from solver.locate import TriangulatedDisc
+from solver.nonrigid import _in_order, _injective, bent, mean_value_weights
+
+
+@pytest.fixture(scope="module")
+def source():
+    return flatten(bumps(2000, seed=1))
+
+
+def places(carried: np.ndarray, source: Flattening) -> np.ndarray:
+    """Where points of the source's disc lie on the source, (q, 3)."""
+    face, barycentric = TriangulatedDisc.of(source.disc, source.mesh.faces).locate(carried)
+    return np.einsum("qk,qkd->qd", barycentric, source.mesh.vertices[source.mesh.faces[face]])
+
+
+def stretched(mesh: TriangleMesh) -> TriangleMesh:
+    """A smooth deformation that no Möbius map follows: wider on one side, higher in the middle."""
+    x, y, z = mesh.vertices.T
+    return TriangleMesh(
+        np.column_stack([x * (1 + 0.15 * y), y * (1 - 0.1 * x), z + 0.15 * np.exp(-4 * (x**2 + y**2))]), mesh.faces
+    )
+
+
+def onto(truth: np.ndarray, disc: np.ndarray, reflected: bool = False) -> Mobius:
+    """The best rotation, with z = 0, from the source's disc to the target's, by the truth."""
+    start = np.conj(truth) if reflected else truth
+    return Mobius(0, float(np.angle(np.vdot(start, disc))), reflected)
+
+
+@pytest.mark.parametrize("reflected", [False, True])
+def test_a_smooth_deformation_is_followed_without_folds(source, reflected):
+    """Another triangulation, pose and scale, deformed, perhaps mirrored: nearer than Möbius, and injective."""
+    target, vertex = remeshed(stretched(source.mesh), 0.7, 1)
+    target = flatten(posed(mirrored(target) if reflected else target, 2))
+    mobius = onto(source.disc[vertex], target.disc, reflected)
+    found = bent(mobius, source, target)
+    truth = source.mesh.vertices[vertex]
+    conformal = percent(places(mobius.inverse()(target.disc), source), truth, source.mesh).mean()
+    error = percent(places(found.carried, source), truth, source.mesh)
+    assert error.mean() < 0.7 * conformal
+    areas = signed_areas(found.carried, target.mesh.faces)
+    assert (areas * (-1 if reflected else 1) > 0).all()
+    assert np.median(found.offset) < 0.01
+
+
+def test_itself_stays_itself(source):
+    found = bent(Mobius(), source, source)
+    assert percent(places(found.carried, source), source.mesh.vertices, source.mesh).max() < 0.1
+    assert found.offset.max() < 1e-3
+    assert found.repaired == 0
+
+
+def test_a_rolled_sheet_is_followed(source):
+    """By 150 degrees: no rigid pose fits it."""
+    target = flatten(posed(bumps(1500, seed=1, bend=2.6), 3))
+    flat = bumps(1500, seed=1)
+    near = np.hypot(*(flat.vertices[:, None, :2] - source.mesh.vertices[:, :2]).transpose(2, 0, 1)).argmin(axis=1)
+    found = bent(onto(source.disc[near], target.disc), source, target)
+    error = percent(places(found.carried, source), flat.vertices, source.mesh)
+    assert error.mean() < 0.7
+    assert (signed_areas(found.carried, target.mesh.faces) > 0).all()
+
+
+def test_loose_vertices_go_nowhere(source):
+    mesh = TriangleMesh(np.vstack([[[9, 9, 9]], source.mesh.vertices]), source.mesh.faces + 1)
+    found = bent(Mobius(), source, flatten(mesh))
+    assert np.isnan(found.carried[0])
+    assert np.isfinite(found.carried[1:]).all()
+
+
+def test_progress_rises_and_may_end_it(source):
+    seen = []
+    bent(Mobius(), source, source, seen.append)
+    assert seen == sorted(seen)
+    assert 0 <= seen[0] <= seen[-1] <= 1
+
+    def stop(_: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bent(Mobius(), source, source, stop)
+
+
+def test_mean_value_weights_reproduce_the_plane():
+    flattening = flatten(bumps(200, seed=0))
+    weights = mean_value_weights(flattening.disc, flattening.mesh.faces)
+    inside = np.setdiff1d(np.arange(len(flattening.disc)), flattening.boundary)
+    mean = (weights @ flattening.disc) / weights.sum(axis=1)
+    assert weights.data.min() > 0
+    assert mean[inside] == pytest.approx(flattening.disc[inside], abs=1e-9)
+
+
+def test_folds_are_undone_near_where_they_are(source):
+    """Some vertices thrown about in one place, the boundary crumpled in another: the rest stays."""
+    rng = np.random.default_rng(4)
+    disc, faces = source.disc, source.mesh.faces
+    thrown = np.flatnonzero(np.abs(disc - 0.2) < 0.08)
+    tangled = disc.copy()
+    tangled[thrown] += 0.05 * (rng.normal(size=len(thrown)) + 1j * rng.normal(size=len(thrown)))
+    crumpled = source.boundary[10:16]
+    tangled[crumpled] = tangled[crumpled[::-1]]
+    assert (signed_areas(tangled, faces) <= 0).sum() > 10
+    result, moved = _injective(tangled, disc, faces, source.boundary, ())
+    assert (signed_areas(result, faces) > 0).all()
+    assert 0 < moved < len(disc) / 4
+    assert moved == (result != tangled).sum()
+
+
+def test_the_boundary_is_put_in_order():
+    conformal = np.exp(2j * np.pi * np.arange(40) / 40)
+    moved = conformal * np.exp(0.3j * np.sin(3 * np.angle(conformal)))
+    assert _in_order(moved, conformal) == pytest.approx(moved)
+    swapped = moved.copy()
+    swapped[[5, 6]] = moved[[6, 5]]
+    found = _in_order(swapped, conformal)
+    steps = np.angle(np.roll(found, -1) / found)
+    assert steps.min() > 0
+    assert np.delete(found, [5, 6]) == pytest.approx(np.delete(moved, [5, 6]))
+    assert np.conj(_in_order(np.conj(swapped), np.conj(conformal))) == pytest.approx(found)
