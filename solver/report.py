@@ -7,6 +7,7 @@ from typing import Any
 
 from .align import Alignment
 from .correspond import Correspondence
+from .mobius import Mobius
 
 
 def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, Any]:
@@ -27,12 +28,13 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "targets": len(alignment.target_samples),
         "matches": len(found.matches),
         "nodes": found.nodes,
-        "mobius": {
-            "z": [alignment.mobius.z.real, alignment.mobius.z.imag],
-            "theta": alignment.mobius.theta,
-            "reflected": alignment.mobius.reflected,
-        },
+        "mobius": _plain(alignment.mobius),
         "orientation_margin": alignment.margin,
+        "rival": None
+        if alignment.rival is None
+        else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
+        "rival_margin": alignment.rival_margin,
+        "vertices_unfolded": None if alignment.bending is None else alignment.bending.repaired,
         "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
@@ -40,3 +42,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "settings": asdict(alignment.settings),
         "warnings": list(alignment.warnings),
     }
+
+
+def _plain(mobius: Mobius) -> dict[str, Any]:
+    return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}

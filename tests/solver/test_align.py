@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,58 @@ def test_a_mirror_symmetric_surface_is_not_reflected_and_the_tie_is_said():
     alignment = align(even, posed(even, 11), AlignSettings(samples=30, targets=200, reflect="auto"))
     assert not alignment.mobius.reflected
     assert any("ambiguous" in warning for warning in alignment.warnings)
+
+
+@pytest.mark.parametrize("folds", [2, 3])
+def test_a_rotational_symmetry_is_called_ambiguous(folds):
+    """The rival is the winner and a turn by a symmetry, and can be had instead."""
+    even = bumps(900, seed=1, folds=folds)
+    alignment = align(even, posed(even, 11), SMALL)
+    assert any(warning.startswith("ambiguous: ") for warning in alignment.warnings)
+    assert alignment.rival is not None
+    assert alignment.rival_margin is not None
+    assert alignment.rival_margin < alignment.settings.reflect_margin
+    step = alignment.rival.mobius.inverse() @ alignment.mobius
+    turn = step.theta * folds / (2 * np.pi)
+    assert abs(step.z) < 0.1
+    assert abs(turn - round(turn)) < 0.1
+    assert round(turn) % folds != 0
+    other = align(even, posed(even, 11), replace(SMALL, take_rival=True))
+    middle = np.abs(other.source.disc) < 0.5
+    assert (
+        np.abs((other.mobius.inverse() @ other.rival.mobius)(other.source.disc) - other.source.disc)[middle].max() < 0.1
+    )
+
+
+def test_an_odd_sheet_is_not_ambiguous(found):
+    alignment, _ = found
+    assert not any("ambiguous" in warning for warning in alignment.warnings)
+    assert alignment.rival_margin > 2 * alignment.settings.reflect_margin
+
+
+def test_landmarks_decide_what_the_surface_leaves_open():
+    """On a sheet with a two-fold symmetry ten landmarks, two of them wrong, choose the half turn or none."""
+    even = bumps(900, seed=1, folds=2)
+    rng = np.random.default_rng(0)
+    place = even.vertices[:, :2] @ [1, 1j]
+    inner = np.flatnonzero(np.abs(place) < 0.8)
+    chosen = rng.choice(inner, 10, replace=False)
+    for half_turn in (False, True):
+        there = np.array([np.abs(place - (-place[v] if half_turn else place[v])).argmin() for v in chosen])
+        there[:2] = rng.choice(inner, 2)
+        alignment = align(even, posed(even, 12), SMALL, landmarks=np.column_stack([chosen, there]))
+        expected = even.vertices * ([-1, -1, 1] if half_turn else [1, 1, 1])
+        assert percent(places(correspond(alignment), even), expected, even).mean() < 2
+        assert not any(warning.startswith("ambiguous: ") for warning in alignment.warnings)
+
+
+def test_landmarks_that_cannot_be_used(sheet, found):
+    target = found[0].target
+    for wrong, named in (([[1, 2, 3]], "shape"), ([[0.5, 1]], "whole"), ([[0, 10**6]], "outside")):
+        with pytest.raises(ValueError, match=named):
+            align(sheet, target.mesh, SMALL, landmarks=wrong)
+    on_rim = align(sheet, target.mesh, SMALL, landmarks=[[5, target.boundary[0]]])
+    assert any("1 landmark on a boundary" in warning for warning in on_rim.warnings)
 
 
 def test_matches_are_pairs_of_samples_near_each_other(found):
