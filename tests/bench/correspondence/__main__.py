@@ -1,0 +1,87 @@
+"""The correspondence on real surfaces, measured against the truth, beside other methods.
+
+    python -m tests.bench.correspondence -o FOLDER [--sets simpop,teeth,...] [--pairs K] [--methods mobius,dense,...]
+
+Run from the repository's root; the data is found as the tests find it. The target of each pair is posed at random and
+decimated to 70 %; every pair runs in both directions. FOLDER, outside the repository, keeps what was computed: each
+result is computed again only when the pair, the method or the solver's code has changed. Methods:
+
+    none, mobius, dense     `align` with its default settings, after each stage
+    best-mobius             the Möbius transformation fitted to the truth: the least error of that stage
+    paper                   the paper's objective (eq. 3) on as many points, orientation given
+    oracle-nearest          the best similarity, fitted to the truth, then the nearest point
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from . import ours
+from .pairs import SETS, Pair
+from .score import Map, Score, score
+from .store import Store
+
+OTHERS: dict[str, Callable[[Pair, Store], Map]] = {
+    "best-mobius": ours.best_mobius,
+    "paper": ours.paper,
+    "oracle-nearest": lambda pair, _: ours.oracle_nearest(pair),
+}
+METHODS = (*ours.STAGES, *OTHERS)
+
+
+def maps(pair: Pair, methods: list[str], store: Store) -> dict[str, Map]:
+    """Return what the methods find on a pair."""
+    found = ours.stages(pair, methods, store)
+    found |= {name: OTHERS[name](pair, store) for name in methods if name in OTHERS}
+    return {name: found[name] for name in methods}
+
+
+def line(pair: Pair, name: str, found: Map, measured: Score) -> str:
+    """Return one line of the table."""
+    marks = "" if measured.marks is None else f"{measured.marks:2d}/{measured.of}"
+    facts = found.facts
+    said = []
+    if "certified" in facts:
+        said.append("proved" if facts["certified"] else "NOT PROVED")
+    if "reflected" in facts and facts["reflected"] != pair.reflected:
+        said.append("WRONG SIDE")
+    said += [f"ambiguous{w[9:22]}" for w in facts.get("warnings", ()) if w.startswith("ambiguous")]
+    if facts.get("margin") is not None:
+        said.append(f"side {facts['margin']:+.3f}, rival {facts['rival_margin']:+.3f}, value {facts['value']:.1f}")
+    said.append(" ".join(f"{stage} {t:.1f}" for stage, t in facts.get("seconds", {}).items() if t >= 0.05))
+    return (
+        f"{pair.kind:10} {pair.name:36} {name:14} {measured.mean:6.2f} {measured.p95:6.2f} {marks:>6} "
+        f"{measured.folded:6.2f}  {'; '.join(said)}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.bench.correspondence",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for results, outside the repository")
+    parser.add_argument("--sets", "--set", default="simpop,ict,teeth", help=f"of {', '.join(SETS)}, or all")
+    parser.add_argument("--pairs", type=int, help="only the first so many pairs of each set")
+    parser.add_argument("--methods", default="best-mobius,none,mobius", help=f"of {', '.join(METHODS)}, or all")
+    options = parser.parse_args()
+    sets = list(SETS) if options.sets == "all" else options.sets.split(",")
+    methods = list(METHODS) if options.methods == "all" else options.methods.split(",")
+    for name, known in [(s, SETS) for s in sets] + [(m, METHODS) for m in methods]:
+        if name not in known:
+            parser.error(f"unknown '{name}': use {', '.join(known)}")
+    store = Store(options.output / "kept")
+    print(f"{'set':10} {'source > target':36} {'method':14} {'mean %':>6} {'95 %':>6} {'marks':>6} {'folds':>6}")
+    for name in sets:
+        for pair in SETS[name](store, options.pairs):
+            for method, found in maps(pair, methods, store).items():
+                print(line(pair, method, found, score(pair, found)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # Blender's module can hang in the C library's exit handlers

@@ -1,0 +1,30 @@
+"""Fewer triangles: Blender's edge collapse, as a user's second scan or low resolution copy would have it."""
+
+import numpy as np
+
+from solver import TriangleMesh
+
+
+def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
+    """Return the mesh with that share of its triangles, by the collapse mode of Blender's Decimate modifier."""
+    import bpy  # takes a second, and is not needed where the result is kept
+
+    size = 1 / np.sqrt(mesh.area)  # Blender's positions are single precision
+    middle = mesh.vertices.mean(axis=0)
+    data = bpy.data.meshes.new("decimated")
+    data.from_pydata(((mesh.vertices - middle) * size).tolist(), [], mesh.faces.tolist())
+    thing = bpy.data.objects.new("decimated", data)
+    bpy.context.scene.collection.objects.link(thing)
+    modifier = thing.modifiers.new("decimate", "DECIMATE")
+    modifier.ratio = share
+    modifier.use_collapse_triangulate = True
+    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    result = evaluated.to_mesh()
+    vertices = np.empty(3 * len(result.vertices), np.float32)
+    result.vertices.foreach_get("co", vertices)
+    faces = np.empty(3 * len(result.polygons), np.int32)
+    result.polygons.foreach_get("vertices", faces)
+    evaluated.to_mesh_clear()
+    bpy.data.objects.remove(thing)
+    bpy.data.meshes.remove(data)
+    return TriangleMesh(vertices.reshape(-1, 3).astype(float) / size + middle, faces.reshape(-1, 3), mesh.name)

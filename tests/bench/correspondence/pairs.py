@@ -1,0 +1,262 @@
+"""The pairs: two surfaces whose true correspondence is known, the target in another pose, scale and triangulation."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from solver import Flattening, TriangleMesh, flatten, topology
+from solver.surface_points import SurfacePoints
+from tests.bench.paper.data import DATA, absent, read
+from tests.solver.scans import posed
+
+from .decimation import decimated
+from .store import Store, digest
+
+KEPT = 0.7
+"""Share of the target's triangles that stay."""
+
+POINTS = 20_000
+"""Points of the target at which the map is measured, spread evenly over its area."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Points inside triangles of the target, and where on the source they truly belong.
+
+    Attributes
+    ----------
+    face : (q,) int
+    barycentric : (q, 3) float64
+    truth : (q, 3) float64
+    """
+
+    face: np.ndarray
+    barycentric: np.ndarray
+    truth: np.ndarray
+
+    def carried(self, target: TriangleMesh, values: np.ndarray) -> np.ndarray:
+        """Return values at the target's vertices, (n, ...), linear in each triangle, at the points, (q, ...)."""
+        return np.einsum("qk,qk...->q...", self.barycentric, values[target.faces[self.face]])
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A source and a posed, decimated target.
+
+    Attributes
+    ----------
+    kind : str
+        The set it belongs to.
+    name : str
+        "source > target".
+    source, target : TriangleMesh
+    surface : Places or None
+        Points all over the target; None where only landmarks are known.
+    landmarks : Places or None
+        Named points.
+    reflected : bool
+        Whether the true map turns orientation round.
+    openings : bool
+        Whether the surfaces have openings.
+    """
+
+    kind: str
+    name: str
+    source: TriangleMesh
+    target: TriangleMesh
+    surface: Places | None
+    landmarks: Places | None
+    reflected: bool = False
+    openings: bool = False
+
+    @property
+    def known(self) -> Places:
+        """What is known all over the surface, else the landmarks."""
+        places = self.surface or self.landmarks
+        assert places is not None
+        return places
+
+    @cached_property
+    def digest(self) -> str:
+        """What the pair consists of, as a short text."""
+        parts = [self.source.vertices, self.source.faces, self.target.vertices, self.target.faces]
+        known = self.known
+        return digest(*parts, known.face, known.barycentric, known.truth, self.reflected, self.openings)
+
+    @cached_property
+    def flat(self) -> tuple[Flattening, Flattening]:
+        """Source and target, flattened."""
+        source, target = (flatten(mesh, fill_holes=self.openings) for mesh in (self.source, self.target))
+        return source, target
+
+    @cached_property
+    def onto(self) -> SurfacePoints:
+        """The source, prepared for nearest points."""
+        return surface_points(self.source)
+
+
+def surface_points(mesh: TriangleMesh) -> SurfacePoints:
+    """Prepare a mesh for nearest points; normals matter enough to tell the two sides of a fold."""
+    return SurfacePoints(mesh, topology(mesh).boundary_loops, 0.01 * np.sqrt(mesh.area))
+
+
+def nearest(onto: SurfacePoints, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the face, (q,), and barycentric coordinates, (q, 3), of the nearest point of a surface."""
+    return onto.nearest_point(points, normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A surface with what is known of it.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        Vertex i is vertex i of the other shapes of its kind, unless only landmarks are known.
+    landmarks : (l,) int or None
+    known : (m,) bool or None
+        Faces whose correspondence means something; all if None.
+    handedness : int
+        +1 or -1; shapes of different handedness are mirror images.
+    openings : bool
+    """
+
+    mesh: TriangleMesh
+    landmarks: np.ndarray | None = None
+    known: np.ndarray | None = None
+    handedness: int = 1
+    openings: bool = False
+
+
+def pair(kind: str, source: Shape, target: Shape, dense: bool, seed: int, store: Store) -> Pair:
+    """Decimate and pose the target and carry the truth along.
+
+    A point of the decimated surface means the nearest one of the surface it was decimated from, and so the point in
+    the same place of the same triangle of the source.
+    """
+    whole = target.mesh
+    few = store.kept(
+        f"decimated {whole.name} {digest(whole.vertices, whole.faces, KEPT)}",
+        lambda: dict(zip(("vertices", "faces"), _arrays(decimated(whole, KEPT)), strict=True)),
+    )
+    small = TriangleMesh(few["vertices"], few["faces"], whole.name)
+    on_whole = surface_points(whole)
+    surface = landmarks = None
+    if dense:
+        rng = np.random.default_rng(seed)
+        face = rng.choice(len(small.faces), POINTS, p=small.face_areas / small.area)
+        barycentric = rng.dirichlet(np.ones(3), POINTS)
+        position = np.einsum("qk,qkd->qd", barycentric, small.vertices[small.faces[face]])
+        normal = small.face_vectors[face] / np.maximum(2 * small.face_areas[face, None], 1e-300)
+        there, weights = nearest(on_whole, position, normal)
+        truth = np.einsum("qk,qkd->qd", weights, source.mesh.vertices[source.mesh.faces[there]])
+        good = np.ones(POINTS, bool) if target.known is None else target.known[there]
+        surface = Places(face[good], barycentric[good], truth[good])
+    if source.landmarks is not None and target.landmarks is not None:
+        normals = whole.vertex_normals()[target.landmarks]
+        there, weights = nearest(surface_points(small), whole.vertices[target.landmarks], normals)
+        landmarks = Places(there, weights, source.mesh.vertices[source.landmarks])
+    return Pair(
+        kind,
+        f"{source.mesh.name} > {whole.name}",
+        source.mesh,
+        posed(small, seed),
+        surface,
+        landmarks,
+        source.handedness != target.handedness,
+        source.openings,
+    )
+
+
+def _arrays(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    return mesh.vertices, mesh.faces
+
+
+# -- the shapes --------------------------------------------------------------------------------------------------------
+
+
+@cache
+def simpop(name: str) -> Shape:
+    return Shape(_named(read(f"faces_simpop/SIMPOP_{name}.obj"), name))
+
+
+@cache
+def ict(name: str) -> Shape:
+    """A face with its openings closed by cones, whose insides mean nothing."""
+    mesh, facts = read(f"faces_ict/ict_{name}.obj"), _ict_facts()
+    filled = _filling(facts)
+    return Shape(_named(mesh, name), np.array(facts["eval13"]), ~filled[mesh.faces].any(axis=1))
+
+
+@cache
+def ict_open(name: str) -> Shape:
+    """The same face with the filling left out: mouth and eyes are open."""
+    closed = ict(name)
+    faces = closed.mesh.faces[closed.known]
+    used, inverse = np.unique(faces, return_inverse=True)
+    mesh = TriangleMesh(closed.mesh.vertices[used], inverse.reshape(-1, 3), name)
+    return Shape(mesh, np.searchsorted(used, closed.landmarks), openings=True)
+
+
+def _ict_facts() -> dict:
+    return json.loads((DATA / "faces_ict/ict_ground_truth.json").read_text(encoding="utf-8"))
+
+
+def _filling(facts: dict) -> np.ndarray:
+    row = np.array(facts["ict_vertex_of_row"])
+    return (row < 0) | (row >= 9409)
+
+
+@cache
+def tooth(name: str) -> Shape:
+    facts = json.loads((DATA / "teeth/landmarks.json").read_text(encoding="utf-8"))[name]
+    mesh = _named(read(f"teeth/{name}.obj"), name)
+    return Shape(mesh, np.array(facts["landmark_vertex"]), handedness=facts["handedness"])
+
+
+@cache
+def brain(side: str) -> Shape:
+    file = {"left": "conte69_L_cortex", "right": "conte69_R_cortex_mirrored"}[side]
+    return Shape(_named(read(f"brain/{file}.obj"), side))
+
+
+def _named(mesh: TriangleMesh, name: str) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices, mesh.faces, name)
+
+
+SIMPOP = (("01", "10"), ("02", "15"), ("20", "30"), ("01", "02"), ("10", "15"), ("02", "30"))
+ICT = (
+    ("M_neutral", "M_happy_level4"),
+    ("M_neutral", "F_neutral"),
+    ("M_sad_level2", "M_happy_level1"),
+    ("F_disgust_level2", "M_sad_level1"),
+)
+TEETH = (("K04", "K05"), ("i14", "i15"), ("H10", "H19"), ("P31", "P35"))
+HARD_TEETH = (("x07", "x17"), ("U02", "U08"), ("x02", "x17"), ("x17", "T14"))
+BRAIN = (("left", "right"),)
+
+
+def _of(kind: str, names: tuple[tuple[str, str], ...], shape: Callable[[str], Shape], dense: bool, file: str):
+    def made(store: Store, count: int | None) -> Iterator[Pair]:
+        if reason := absent(file):
+            print(f"{kind} skipped: {reason}")
+            return
+        for k, (a, b) in enumerate(names[:count]):
+            yield pair(kind, shape(a), shape(b), dense, 2 * k, store)
+            yield pair(kind, shape(b), shape(a), dense, 2 * k + 1, store)
+
+    return made
+
+
+SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
+    "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
+    "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
+    "ict-open": _of("ict-open", ICT, ict_open, True, "faces_ict/ict_ground_truth.json"),
+    "teeth": _of("teeth", TEETH, tooth, False, "teeth/landmarks.json"),
+    "hard-teeth": _of("hard-teeth", HARD_TEETH, tooth, False, "teeth/landmarks.json"),
+    "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
+}
+"""Each set by its name: pairs in both directions, of the first `count` if given."""

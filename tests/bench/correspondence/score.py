@@ -1,0 +1,85 @@
+"""How good a map from the target's vertices to points of the source is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.distortion import signed_areas
+
+from .pairs import Pair, Places
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """Where each target vertex goes on the source.
+
+    Attributes
+    ----------
+    face : (n,) int
+    barycentric : (n, 3) float64
+    confidence : (n,) float64 or None
+        In [0, 1], if the method says.
+    facts : dict
+        What else the method says: seconds, certified, warnings, ...
+    """
+
+    face: np.ndarray
+    barycentric: np.ndarray
+    confidence: np.ndarray | None
+    facts: dict
+
+    def at(self, pair: Pair, values: np.ndarray) -> np.ndarray:
+        """Return values at the source's vertices, (n_source, ...), carried to the target's."""
+        return np.einsum("nk,nk...->n...", self.barycentric, values[pair.source.faces[self.face]])
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors in % of the source's bounding box diagonal, the side on which they are distances.
+
+    Attributes
+    ----------
+    mean, p95 : float
+        Over points inside triangles, evenly spread over the target's area; over landmarks where no more is known.
+    marks : int or None
+        Landmark pairs that are mutually nearest.
+    of : int or None
+        Landmark pairs.
+    folded : float
+        Triangles of the target that are turned over or collapsed in the source's disc, in %.
+    """
+
+    mean: float
+    p95: float
+    marks: int | None
+    of: int | None
+    folded: float
+
+
+def errors(pair: Pair, found: Map, places: Places) -> np.ndarray:
+    """Return the errors at given places, (q,), in % of the source's diagonal."""
+    position = places.carried(pair.target, found.at(pair, pair.source.vertices))
+    return 100 * np.linalg.norm(position - places.truth, axis=1) / pair.source.diagonal
+
+
+def score(pair: Pair, found: Map) -> Score:
+    """Measure a map."""
+    error = errors(pair, found, pair.known)
+    marks = None if pair.landmarks is None else mutually_nearest(pair, found, pair.landmarks)
+    areas = signed_areas(found.at(pair, pair.flat[0].disc), pair.target.faces)
+    way = -1 if pair.reflected else 1
+    return Score(
+        float(error.mean()),
+        float(np.quantile(error, 0.95)),
+        marks,
+        None if pair.landmarks is None else len(pair.landmarks.face),
+        100 * float((way * areas <= 0).mean()),
+    )
+
+
+def mutually_nearest(pair: Pair, found: Map, landmarks: Places) -> int:
+    """Return how many landmarks, carried over, and their true places are each other's nearest."""
+    position = landmarks.carried(pair.target, found.at(pair, pair.source.vertices))
+    distance = np.linalg.norm(position[:, None] - landmarks.truth, axis=2)
+    own = np.arange(len(distance))
+    return int(((distance.argmin(axis=0) == own) & (distance.argmin(axis=1) == own)).sum())
