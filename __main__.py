@@ -31,6 +31,8 @@ def main() -> int:
         return 2
     load_extension()
     try:
+        if sys.argv[1:2] == ["build"]:
+            return importlib.import_module(f"{PACKAGE}.release.build").main(sys.argv[2:])
         return importlib.import_module(f"{PACKAGE}.mobius_addon.command_line").main_quietly(sys.argv[1:])
     except ImportError as error:
         missing = (error.name or "").partition(".")[0]

@@ -1,0 +1,1 @@
+"""What makes the zips that people install: `python . build`. No part of them itself."""
