@@ -38,6 +38,9 @@ FINE_NODES = 6000
 STIFFEST, SOFTEST, ROUNDS = 0.5, 0.005, 20
 """The wavelength below which the plate resists, from half the width of the surface to some edges of a scan."""
 
+DRAFT_ROUNDS = 10
+"""Rounds before boundaries attract each other; by then it is clear which of them correspond."""
+
 FINE_STIFFNESS, FINE_ROUNDS = 0.01, 3
 """The wavelength at which the last rounds begin."""
 
@@ -88,23 +91,66 @@ class Bending:
     repaired: int
 
 
-def bent(
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """The target bent onto the source by the stiffer half of the rounds, its boundaries left alone.
+
+    Attributes
+    ----------
+    onto : SurfacePoints
+        The source about the middle of its boundary, in roots of its area.
+    whole : TriangleMesh
+        The target; mirrored, with its faces turned, where the Möbius transformation is reflected.
+    conformal : (n,) complex128
+        Where the Möbius transformation carries each target vertex in the source's disc; nan at vertices in no face.
+    unbent : (n, 3) float64
+        The target's vertices in the source's scale.
+    nodes : (q,) int
+        Target vertices that are bent.
+    flat : TriangleMesh
+        The nodes among `unbent`, with faces between them.
+    rest, now : (q, 3) float64
+        The nodes in the source's pose, and bent.
+    """
+
+    onto: SurfacePoints
+    whole: TriangleMesh
+    conformal: Complexes
+    unbent: Floats
+    nodes: Integers
+    flat: TriangleMesh
+    rest: Floats
+    now: Floats
+
+    def places(self, target: Flattening) -> Floats:
+        """Return where all target vertices are, (n, 3), in the frame of `onto`; 0 at vertices in no face."""
+        used = np.flatnonzero(np.isfinite(target.disc.real))
+        places = np.zeros_like(self.unbent)
+        places[used] = _following(self.nodes, self.flat, self.now, target.disc, self.unbent, used)
+        return places
+
+
+def drafted(
     mobius: Mobius,
     source: Flattening,
     target: Flattening,
+    trust: Floats | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Bending:
-    """Bend the target onto the source, beginning at the Möbius map.
+) -> Draft:
+    """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
 
     The target is first given the source's pose and coarse bend: an embedding with the lengths of the target whose
     surroundings are turned like their Möbius images (Sorkine and Alexa 2007, with rotations averaged over
-    `BEND_LENGTH`). The result keeps the orientation of every triangle in the source's disc.
+    `BEND_LENGTH`).
 
     Parameters
     ----------
     mobius : Mobius
         From the source's disc to the target's.
     source, target : Flattening
+    trust : (n,) float64, optional
+        How far the Möbius map is to be believed at each target vertex, in (0, 1]: scale, pose and coarse bend are taken
+        from where it is. Default: everywhere.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
     """
@@ -124,22 +170,58 @@ def bent(
 
     nodes, faces = _coarse(target, NODES, order)
     places = _positions(conformal[nodes], source, onto)
-    unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places)
+    believed = np.ones(len(nodes)) if trust is None else trust[nodes]
+    unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(unbent[nodes], faces)
-    rest = _turned_like(flat, places)
+    rest = _turned_like(flat, places, believed)
     rest = _in_pose(TriangleMesh(rest, faces), onto)
-    now = _relaxed(rest, rest, faces, onto, (STIFFEST, SOFTEST), ROUNDS, lambda share: tell(0.1 + 0.6 * share))
+    lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:DRAFT_ROUNDS]
+    now = _relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
+    return Draft(onto, whole, conformal, unbent, nodes, flat, rest, now)
+
+
+def finished(
+    draft: Draft,
+    source: Flattening,
+    target: Flattening,
+    alike: Booleans | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Bending:
+    """Bend a draft the rest of the way.
+
+    Parameters
+    ----------
+    draft : Draft
+    source, target : Flattening
+        As for `drafted`.
+    alike : (n,) bool, optional
+        Target vertices that are drawn to the source's boundaries where they are on a boundary themselves; not those
+        along which the target alone was cut. Default: all.
+    progress : callable, optional
+        Called with the share of the work done, in [0, 1]; may raise to end it.
+
+    Returns
+    -------
+    Bending
+        Keeps the orientation of every triangle in the source's disc.
+    """
+    tell = progress or (lambda _: None)
+    onto, unbent, flat, nodes, conformal = draft.onto, draft.unbent, draft.flat, draft.nodes, draft.conformal
+    drawn = np.ones(len(target.disc), bool) if alike is None else alike
+    used = np.flatnonzero(np.isfinite(target.disc.real))
+    order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
+    lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:]
+    now = _relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[nodes], lambda share: tell(0.5 * share))
 
     fine, fine_faces = _coarse(target, FINE_NODES, order)
     followed = _following(nodes, flat, now, target.disc, unbent, fine)
-    start = _following(nodes, flat, rest, target.disc, unbent, fine)
-    settled = _relaxed(
-        start, followed, fine_faces, onto, (FINE_STIFFNESS, SOFTEST), FINE_ROUNDS, lambda share: tell(0.7 + 0.2 * share)
-    )
+    start = _following(nodes, flat, draft.rest, target.disc, unbent, fine)
+    lengths = _lengths(FINE_STIFFNESS, SOFTEST, FINE_ROUNDS)
+    settled = _relaxed(start, followed, fine_faces, onto, lengths, drawn[fine], lambda share: tell(0.5 + 0.3 * share))
     all_places = np.zeros_like(unbent)
     all_places[used] = _following(fine, TriangleMesh(unbent[fine], fine_faces), settled, target.disc, unbent, used)
     all_places[fine] = settled
-    normals = TriangleMesh(all_places, whole.faces).vertex_normals()
+    normals = TriangleMesh(all_places, draft.whole.faces).vertex_normals()
     face, barycentric = onto.nearest_point(all_places[used], normals[used])
     reached = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
     offset = np.zeros(len(target.disc))
@@ -151,19 +233,49 @@ def bent(
     return Bending(carried, offset, repaired)
 
 
+def bent(
+    mobius: Mobius,
+    source: Flattening,
+    target: Flattening,
+    progress: Callable[[float], None] | None = None,
+) -> Bending:
+    """Bend the target onto the source, all of it: `drafted`, then `finished`."""
+    tell = progress or (lambda _: None)
+    draft = drafted(mobius, source, target, progress=lambda share: tell(0.4 * share))
+    return finished(draft, source, target, progress=lambda share: tell(0.4 + 0.6 * share))
+
+
+def _lengths(stiffest: float, softest: float, rounds: int) -> Floats:
+    """Return the plate's wavelength in each round, (rounds,), falling by equal factors."""
+    return np.geomspace(stiffest, softest, rounds)
+
+
 def _positions(disc_points: Complexes, source: Flattening, onto: SurfacePoints) -> Floats:
     """Return where points of the source's disc lie on the scaled source, (q, 3)."""
     face, barycentric = TriangulatedDisc.of(source.disc, source.mesh.faces).locate(disc_points)
     return np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
 
 
-def _growth(mesh: TriangleMesh, places: Floats) -> float:
-    """Return how much longer edges are in `places`, (n, 3), than in the mesh: the median ratio."""
+def _growth(mesh: TriangleMesh, places: Floats, trust: Floats) -> float:
+    """Return how much longer edges are in `places`, (n, 3), than in the mesh: the median ratio, by trust, (n,)."""
     i, j = mesh.edges.T
     own = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
     there = np.linalg.norm(places[i] - places[j], axis=1)
     some = (own > 0) & (there > 0)
-    return float(np.exp(np.median(np.log(there[some] / own[some])))) if some.any() else 1.0
+    if not some.any():
+        return 1.0
+    return weighted_median(there[some] / own[some], (trust[i] * trust[j])[some])
+
+
+def weighted_median(values: Floats, weights: Floats) -> float:
+    """Return the value, of (n,), below and above which lies half of the weight, (n,), each.
+
+    >>> weighted_median(np.array([3.0, 1.0, 2.0]), np.array([5.0, 1.0, 1.0]))
+    3.0
+    """
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(total, total[-1] / 2)]])
 
 
 def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integers, Integers]:
@@ -185,26 +297,29 @@ def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integ
     nodes = np.concatenate([inner[spread(flattening.mesh.vertices[inner], count)], rim])
     faces = Delaunay(np.stack([disc[nodes].real, disc[nodes].imag], axis=1)).simplices.astype(np.intp)
     turned = signed_areas(disc[nodes], faces)
-    faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)
-    return nodes, faces[np.abs(turned) > 1e-12][:, order]
+    faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]
+    # where the disc is crowded a node may have slivers alone
+    held, place = np.unique(faces, return_inverse=True)
+    return nodes[held], place.reshape(-1, 3)[:, order]
 
 
-def _smooth_rotations(rest: TriangleMesh, now: Floats) -> Floats:
+def _smooth_rotations(rest: TriangleMesh, now: Floats, trust: Floats | None = None) -> Floats:
     """Return the rotation, (n, 3, 3), that carries the surroundings of each vertex of `rest` to those in `now`."""
     stiffness = laplacian(rest)
     i, j = rest.edges.T
-    weight = np.maximum(-np.asarray(stiffness[i, j]).ravel(), 0)
+    trust = np.ones(len(now)) if trust is None else trust
+    weight = np.maximum(-np.asarray(stiffness[i, j]).ravel(), 0) * np.sqrt(trust[i] * trust[j])
     products = weight[:, None, None] * (now[i] - now[j])[:, :, None] * (rest.vertices[i] - rest.vertices[j])[:, None, :]
     total = _summed(i, products, len(now)) + _summed(j, products, len(now))
-    average = factorised(csc_array(diags_array(rest.vertex_areas) + BEND_LENGTH**2 * stiffness))
+    average = factorised(csc_array(diags_array(rest.vertex_areas * trust) + BEND_LENGTH**2 * stiffness))
     u, _, v = np.linalg.svd(average(total.reshape(-1, 9)).reshape(-1, 3, 3))
     u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
     return np.asarray(u @ v, np.float64)
 
 
-def _turned_like(rest: TriangleMesh, places: Floats, rounds: int = 3) -> Floats:
-    """Return `rest` with its surroundings turned as in `places`, and with its own lengths, (n, 3)."""
-    stiffness, areas = laplacian(rest), rest.vertex_areas
+def _turned_like(rest: TriangleMesh, places: Floats, trust: Floats, rounds: int = 3) -> Floats:
+    """Return `rest` with its surroundings turned as in `places`, as far as these are trusted, and its own lengths."""
+    stiffness, areas = laplacian(rest), rest.vertex_areas * trust
     i, j = rest.edges.T
     weight = -np.asarray(stiffness[i, j]).ravel()
     side = rest.vertices[i] - rest.vertices[j]
@@ -212,7 +327,7 @@ def _turned_like(rest: TriangleMesh, places: Floats, rounds: int = 3) -> Floats:
     solve = factorised(csc_array(stiffness + diags_array(areas)))
     now = places
     for _ in range(rounds):
-        turn = _smooth_rotations(rest, now)
+        turn = _smooth_rotations(rest, now, trust)
         wanted = weight[:, None] * np.einsum("eij,ej->ei", (turn[i] + turn[j]) / 2, side)
         now = solve(_summed(i, wanted, len(now)) - _summed(j, wanted, len(now)) + areas[:, None] * places)
     return now
@@ -243,12 +358,14 @@ def _following(
     return np.einsum("qk,qkd->qd", barycentric, now[corners] + np.einsum("qkij,qkj->qki", turn, from_node))
 
 
-def _pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, slip: float) -> tuple[Floats, Floats]:
+def _pulls(
+    x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, slip: float, drawn: Booleans
+) -> tuple[Floats, Floats]:
     """Return how the source pulls at each vertex: stiffness, (n, 3, 3), and force, (n, 3), of a spring.
 
     Towards the tangent plane of the point that suits in position and normal, and with a share `slip` to the point
     itself; less if the normals differ or the distance is an outlier, not at all where that point is on the edge.
-    Vertices on a boundary are pulled to the source's boundary too, if it is near.
+    Vertices on a boundary that are `drawn`, (n,), are pulled to the source's boundary too, if it is near.
     """
     mesh = TriangleMesh(x, faces)
     own = mesh.vertex_normals()
@@ -260,6 +377,7 @@ def _pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, slip:
     stiffness = _along(normal, weight * (1 - slip)) + (weight * slip)[:, None, None] * np.eye(3)
     force = np.einsum("nij,nj->ni", stiffness, point - x)
     rim = np.unique(mesh.edges[np.bincount(mesh.edge_of_side, minlength=len(mesh.edges)) == 1])
+    rim = rim[drawn[rim]]
     point, tangent = onto.nearest_on_boundary(x[rim])
     weight = areas[rim] * np.exp(-(((point - x[rim]) ** 2).sum(axis=1) / RIM_REACH**2) / 2)
     across = weight[:, None, None] * np.eye(3) - _along(tangent, weight * (1 - slip))
@@ -275,7 +393,7 @@ def _in_pose(rest: TriangleMesh, onto: SurfacePoints) -> Floats:
     """
     areas, x = rest.vertex_areas / rest.area, rest.vertices
     for _ in range(POSE_ROUNDS):
-        stiffness, force = _pulls(x, rest.faces, areas, onto, SLIP)
+        stiffness, force = _pulls(x, rest.faces, areas, onto, SLIP, np.zeros(len(x), bool))
         middle = areas @ x
         arm = x - middle
         # columns: shift and turn
@@ -296,23 +414,23 @@ def _relaxed(
     now: Floats,
     faces: Integers,
     onto: SurfacePoints,
-    lengths: tuple[float, float],
-    rounds: int,
+    lengths: Floats,
+    drawn: Booleans,
     tell: Callable[[float], None],
 ) -> Floats:
     """Return the vertices, (n, 3), bent from `rest` onto the source, beginning at `now`.
 
     Each round minimises the energy of the springs (`_pulls`) plus l^4 times the integral of the squared Laplacian of
-    the displacement from `rest`; l falls from round to round.
+    the displacement from `rest`, for l in `lengths`. Boundary vertices that are `drawn` go to the source's boundaries.
     """
     mesh = TriangleMesh(rest, faces)
     stiffness, areas = laplacian(mesh), mesh.vertex_areas / mesh.area
     plate = csc_array(stiffness @ diags_array(1 / np.maximum(areas, 1e-3 * areas.mean())) @ stiffness)
     shift = now - rest
-    for k in range(rounds):
-        tell(k / rounds)
-        stiff = (lengths[0] * (lengths[1] / lengths[0]) ** (k / (rounds - 1))) ** 4
-        pull, force = _pulls(rest + shift, faces, areas, onto, SLIP)
+    for k, length in enumerate(lengths):
+        tell(k / len(lengths))
+        stiff = length**4
+        pull, force = _pulls(rest + shift, faces, areas, onto, SLIP, drawn)
         # the same system with the same pull in all directions, which one factorisation solves
         even = np.einsum("nii->n", pull) / 3 + 1e-4 * areas
         shift = _conjugate_gradients(
