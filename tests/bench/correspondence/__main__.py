@@ -10,6 +10,9 @@ result is computed again only when the pair, the method or the solver's code has
     best-mobius             the Möbius transformation fitted to the truth: the least error of that stage
     paper                   the paper's objective (eq. 3) on as many points, orientation given
     oracle-nearest          the best similarity, fitted to the truth, then the nearest point
+    pose                    open3d's pose (FPFH, RANSAC, closest points), then the nearest point
+    meshmonk                that pose, then meshmonk
+    zoomout                 functional maps (pyfmaps) with ZoomOut
 """
 
 import argparse
@@ -18,7 +21,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from . import ours
+from . import ours, tools
 from .pairs import SETS, Pair
 from .score import Map, Score, score
 from .store import Store
@@ -26,6 +29,9 @@ from .store import Store
 OTHERS: dict[str, Callable[[Pair, Store], Map]] = {
     "best-mobius": ours.best_mobius,
     "paper": ours.paper,
+    "pose": tools.pose,
+    "meshmonk": tools.meshmonk,
+    "zoomout": tools.zoomout,
     "oracle-nearest": lambda pair, _: ours.oracle_nearest(pair),
 }
 METHODS = (*ours.STAGES, *OTHERS)

@@ -12,6 +12,7 @@ from solver.surface_points import SurfacePoints
 from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import posed
 
+from .bent import bent_pieces
 from .decimation import decimated
 from .store import Store, digest
 
@@ -251,6 +252,13 @@ def _of(kind: str, names: tuple[tuple[str, str], ...], shape: Callable[[str], Sh
     return made
 
 
+def _bent(store: Store, count: int | None) -> Iterator[Pair]:
+    pieces = list(bent_pieces(store))[:count]
+    for k, (rest, bent) in enumerate(pieces):
+        yield pair("bent", Shape(rest), Shape(bent), True, 2 * k, store)
+        yield pair("bent", Shape(bent), Shape(rest), True, 2 * k + 1, store)
+
+
 SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
     "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
@@ -258,5 +266,6 @@ SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "teeth": _of("teeth", TEETH, tooth, False, "teeth/landmarks.json"),
     "hard-teeth": _of("hard-teeth", HARD_TEETH, tooth, False, "teeth/landmarks.json"),
     "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
+    "bent": _bent,
 }
 """Each set by its name: pairs in both directions, of the first `count` if given."""
