@@ -1,6 +1,7 @@
 """The correspondence on real surfaces, measured against the truth, beside other methods.
 
     python -m tests.bench.correspondence -o FOLDER [--sets simpop,teeth,...] [--pairs K] [--methods mobius,dense,...]
+                                         [--pictures]
 
 Run from the repository's root; the data is found as the tests find it. The target of each pair is posed at random and
 decimated to 70 %; every pair runs in both directions. FOLDER, outside the repository, keeps what was computed: each
@@ -23,8 +24,9 @@ from pathlib import Path
 
 from . import ours, tools
 from .pairs import SETS, Pair
-from .score import Map, Score, score
+from .score import Map, score
 from .store import Store
+from .tables import Row, folds, medians, seconds, targets
 
 OTHERS: dict[str, Callable[[Pair, Store], Map]] = {
     "best-mobius": ours.best_mobius,
@@ -44,21 +46,21 @@ def maps(pair: Pair, methods: list[str], store: Store) -> dict[str, Map]:
     return {name: found[name] for name in methods}
 
 
-def line(pair: Pair, name: str, found: Map, measured: Score) -> str:
-    """Return one line of the table."""
+def line(row: Row) -> str:
+    """Return one line of the long table."""
+    pair, measured, facts = row.pair, row.score, row.found.facts
     marks = "" if measured.marks is None else f"{measured.marks:2d}/{measured.of}"
-    facts = found.facts
     said = []
     if "certified" in facts:
         said.append("proved" if facts["certified"] else "NOT PROVED")
     if "reflected" in facts and facts["reflected"] != pair.reflected:
         said.append("WRONG SIDE")
-    said += [f"ambiguous{w[9:22]}" for w in facts.get("warnings", ()) if w.startswith("ambiguous")]
+    said += [" ".join(w.split()[:2]).rstrip(":") for w in facts.get("warnings", ()) if w.startswith("ambiguous")]
     if facts.get("margin") is not None:
         said.append(f"side {facts['margin']:+.3f}, rival {facts['rival_margin']:+.3f}, value {facts['value']:.1f}")
     said.append(" ".join(f"{stage} {t:.1f}" for stage, t in facts.get("seconds", {}).items() if t >= 0.05))
     return (
-        f"{pair.kind:10} {pair.name:36} {name:14} {measured.mean:6.2f} {measured.p95:6.2f} {marks:>6} "
+        f"{pair.kind:10} {pair.name:36} {row.method:14} {measured.mean:6.2f} {measured.p95:6.2f} {marks:>6} "
         f"{measured.folded:6.2f}  {'; '.join(said)}"
     )
 
@@ -73,6 +75,7 @@ def main() -> None:
     parser.add_argument("--sets", "--set", default="simpop,ict,teeth", help=f"of {', '.join(SETS)}, or all")
     parser.add_argument("--pairs", type=int, help="only the first so many pairs of each set")
     parser.add_argument("--methods", default="best-mobius,none,mobius", help=f"of {', '.join(METHODS)}, or all")
+    parser.add_argument("--pictures", action="store_true", help="a sheet of error maps per set; wants the group bench")
     options = parser.parse_args()
     sets = list(SETS) if options.sets == "all" else options.sets.split(",")
     methods = list(METHODS) if options.methods == "all" else options.methods.split(",")
@@ -80,11 +83,24 @@ def main() -> None:
         if name not in known:
             parser.error(f"unknown '{name}': use {', '.join(known)}")
     store = Store(options.output / "kept")
+    rows: list[Row] = []
     print(f"{'set':10} {'source > target':36} {'method':14} {'mean %':>6} {'95 %':>6} {'marks':>6} {'folds':>6}")
     for name in sets:
         for pair in SETS[name](store, options.pairs):
             for method, found in maps(pair, methods, store).items():
-                print(line(pair, method, found, score(pair, found)), flush=True)
+                rows.append(Row(pair, method, found, score(pair, found)))
+                print(line(rows[-1]), flush=True)
+    tables = "\n".join([medians(rows), "", folds(rows), targets(rows), seconds(rows)])
+    (options.output / "tables.txt").write_text(tables, encoding="utf-8")
+    print(f"\n{tables}")
+    if options.pictures:
+        from . import pictures
+
+        for name in sets:
+            if some := [row for row in rows if row.pair.kind == name]:
+                pictures.sheet(options.output / f"{name}.png", some)
+        if any(row.found.confidence is not None for row in rows):
+            pictures.confidence(options.output / "confidence.png", rows)
 
 
 if __name__ == "__main__":
