@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..solver import Alignment, AlignSettings, Correspondence
-    from .attributes import Transfer
+    from .attributes import Transfer, TransferSettings
     from .files import Imported
     from .mesh_data import Surface
 
@@ -154,8 +154,8 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
         _add_align_options(added.add_argument_group("alignment"))
     transfer.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
-    transfer.add_argument("--only", metavar="KIND,...", help="carry these only; one unknown lists all")
     transfer.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
+    _add_transfer_options(transfer.add_argument_group("transfer"))
     return parser
 
 
@@ -192,6 +192,68 @@ def _add_align_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")
     group.add_argument("--z-max", type=float, metavar="Z", help="how far apart the discs' centres may lie, in (0, 1)")
     group.add_argument("--time-limit", type=float, metavar="SECONDS", help="of each search; 0: none")
+
+
+def _add_transfer_options(group: argparse._ArgumentGroup) -> None:
+    """Add the choices of `attributes.TransferSettings`, whose defaults hold where none is given."""
+    group.add_argument("--only", metavar="KIND,...", help="carry these only; one unknown lists all")
+    which = group.add_mutually_exclusive_group()
+    which.add_argument("--names", metavar="NAME,...", help="carry layers of these names only; * and ? stand for any")
+    which.add_argument("--active", action="store_true", help="carry the active layer of each kind only")
+    group.add_argument(
+        "--deform-only", action="store_true", help="of the vertex groups, those of an armature's deforming bones"
+    )
+    group.add_argument(
+        "--collisions", choices=("replace", "number"), help="what a layer does whose name is taken; default: replace"
+    )
+    group.add_argument(
+        "--mix", choices=("replace", "add", "subtract", "multiply"), help="with values that are there; default: replace"
+    )
+    group.add_argument("--mix-factor", type=float, metavar="F", help="how far to go to the result, in [0, 1]")
+    group.add_argument("--limit", type=int, metavar="N", help="keep the strongest N vertex groups of a vertex; 0: all")
+    group.add_argument("--normalize", action="store_true", help="scale the weights of each vertex to the sum 1")
+    group.add_argument("--smallest-weight", type=float, metavar="W", help="smaller weights are left out")
+    for side, verb in (("source", "gives"), ("target", "receives")):
+        group.add_argument(
+            f"--{side}-mask", metavar="NAME", help=f"vertex group or attribute of what {verb}; 'selection': selected"
+        )
+        group.add_argument(f"--invert-{side}-mask", action="store_true", help=f"all but that part {verb}")
+    group.add_argument(
+        "--unmatched",
+        choices=("carry", "leave", "nearest", "fill"),
+        help="what vertices get without a certain counterpart: what the map says all the same (default), nothing, the "
+        "nearest matched value, a smooth fill",
+    )
+    group.add_argument(
+        "--evaluated", action="store_true", help="the source as its modifiers and the mix of its shape keys show it"
+    )
+
+
+def _transfer_settings(options: argparse.Namespace) -> TransferSettings:
+    """Return the choices of a transfer with the given options in place of the defaults."""
+    from .attributes import Mask, TransferSettings, split_names
+    from .files import Unreadable
+
+    given = {"kinds": tuple(_kinds(options.only)), "evaluated": options.evaluated, "normalize": options.normalize}
+    given |= {"deform_only": options.deform_only}
+    if options.names is not None:
+        given |= {"layers": "named", "names": split_names(options.names)}
+    elif options.active:
+        given["layers"] = "active"
+    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched"):
+        if getattr(options, name) is not None:
+            given[name] = getattr(options, name)
+    for side in ("source", "target"):
+        name, invert = getattr(options, f"{side}_mask"), getattr(options, f"invert_{side}_mask")
+        if name is not None:
+            by = "selected" if name == "selection" else "named"
+            given[f"{side}_mask"] = Mask(by, "" if by == "selected" else name, invert)
+        elif invert:
+            raise Unreadable(f"--invert-{side}-mask inverts --{side}-mask: give both")
+    try:
+        return TransferSettings(**given)
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
 
 
 def _align_settings(options: argparse.Namespace) -> AlignSettings:
@@ -314,12 +376,13 @@ def _align(options: argparse.Namespace) -> int:
 
 
 def _transfer(options: argparse.Namespace) -> int:
-    from ..solver import load_map, report, save_map
-    from .attributes import Carrier, plan_transfer
-    from .files import Unreadable, export_mesh, new_scene, outputs
-    from .operators.transfer import describe_counts
+    from dataclasses import asdict
 
-    kinds = _kinds(options.only)
+    from ..solver import load_map, report, save_map
+    from .files import Unreadable, export_mesh, new_scene, outputs
+    from .operators.transfer import describe_counts, read_through
+
+    choices = _transfer_settings(options)
     settings = _align_settings(options)
     if options.use_map and (options.map or options.report):
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
@@ -332,20 +395,23 @@ def _transfer(options: argparse.Namespace) -> int:
         correspondence = _fitting_map(load_map, options, surfaces)
     else:
         alignment, correspondence = _aligned(options, surfaces, settings)
-    plan = plan_transfer(source.obj, target.obj, Carrier(correspondence, *surfaces), kinds)
+    plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
     plan.write(target.obj)
     with outputs() as written:
         export_mesh(target.obj, written.path(options.output))
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence)
         if alignment and options.report:
-            figures = report(alignment, correspondence) | {"transferred": _listed(plan)}
+            figures = report(alignment, correspondence) | {
+                "transferred": _listed(plan),
+                "unmatched": asdict(plan.unmatched),
+            }
             _write_report(written.path(options.report), figures)
     for warning in plan.warnings:
         say_error(f"mobius: warning: {warning}")
     _warn_of_losses(options.output, plan.counts())
     _warn_of_order(options.map, (source, target))
-    say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}")
+    say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
     return DONE
 
 

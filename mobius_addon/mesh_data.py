@@ -8,9 +8,10 @@ from typing import Any
 
 import bpy
 import numpy as np
+import numpy.typing as npt
 
 from ..solver import TriangleMesh
-from ..solver.mesh import Integers
+from ..solver.mesh import Floats, Integers
 
 
 class Refusal(Exception):  # noqa: N818  (no error of the program)
@@ -89,6 +90,11 @@ def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
 def is_mirrored(obj: bpy.types.Object) -> bool:
     """Return whether the object's transform turns left into right."""
     return obj.matrix_world.to_3x3().determinant() < 0
+
+
+def mirrored(obj: bpy.types.Object, vectors: npt.NDArray[Any]) -> Floats:
+    """Return vectors, (n, 3), between an object's own space and that of its `Surface`, either way."""
+    return np.asarray(vectors * np.array([-1.0 if is_mirrored(obj) else 1.0, 1.0, 1.0]), dtype=np.float64)
 
 
 def scale_warning(obj: bpy.types.Object) -> str | None:

@@ -1,13 +1,14 @@
 """Options that operators and the scene's settings share, each defined once."""
 
 # no postponed annotations here: Blender reads the properties from them
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 import numpy as np
 
 from ..solver import AlignSettings, TriangleMesh
-from .attributes import KINDS
+from .attributes import KINDS, Mask, TransferSettings, mask_names, split_names
 from .computation import Repair, selected_loop
 from .mesh_data import foreach
 
@@ -138,18 +139,171 @@ def enum_identifier(kind: str) -> str:
     return kind.upper().replace("-", "_")
 
 
-class TransferOptions:
-    """Mixin with the options of a transfer."""
+def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
+    """Return what suggests names for a mask of the scene's source or target."""
 
+    def suggest(_owner: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+        obj = getattr(context.scene.mobius, role)
+        return [] if obj is None or obj.type != "MESH" else mask_names(obj)
+
+    return suggest
+
+
+_TRANSFER = TransferSettings()
+_MASK_ITEMS = (
+    ("none", "Everything", "Every vertex takes part"),
+    ("selected", "Selection", "Vertices that are selected, as chosen in Edit Mode"),
+    ("named", "By Name", "As a vertex group or an attribute says"),
+)
+
+
+class SourceMaskOptions:
+    """Mixin with which part of the source counts; see `attributes.Mask`."""
+
+    source_mask: bpy.props.EnumProperty(
+        name="From", description="Which part of the source gives", items=_MASK_ITEMS, default=_TRANSFER.source_mask.by
+    )
+    source_mask_name: bpy.props.StringProperty(
+        name="Source Mask",
+        description="Vertex group or attribute of the source; what has at least half of the full weight gives",
+        search=_nameable("source"),
+        search_options={"SUGGESTION"},
+    )
+    source_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the source gives")
+
+
+class TransferOptions(SourceMaskOptions):
+    """Mixin with the options of a transfer, named as in `attributes.TransferSettings`."""
+
+    targets: bpy.props.EnumProperty(
+        name="Carry To",
+        description="Which meshes receive",
+        items=(
+            ("target", "Target", "The chosen target"),
+            ("selected", "Selected", "All selected meshes, each through its own alignment with the source"),
+        ),
+        default="target",
+    )
     kinds: bpy.props.EnumProperty(
         name="Data",
         description="What to carry from the source to the target",
         items=tuple((enum_identifier(kind.identifier), kind.label, kind.description) for kind in KINDS),
         options={"ENUM_FLAG"},
-        default={enum_identifier(kind.identifier) for kind in KINDS},
+        default={enum_identifier(kind) for kind in _TRANSFER.kinds},
+    )
+    layers: bpy.props.EnumProperty(
+        name="Layers",
+        description="Which of the source's vertex groups, shape keys, UV maps, colors and attributes to carry",
+        items=(
+            ("all", "All", "All of the chosen kinds"),
+            ("active", "Active", "The active one of each chosen kind"),
+            ("named", "By Name", "Those whose names are given"),
+        ),
+        default=_TRANSFER.layers,
+    )
+    layer_names: bpy.props.StringProperty(
+        name="Names",
+        description="Names of layers to carry, with commas between; * and ? stand for any characters",
+    )
+    deform_only: bpy.props.BoolProperty(
+        name="Only Deform Bones",
+        description="Of the vertex groups, carry those that belong to a deforming bone of an armature of either mesh",
+        default=_TRANSFER.deform_only,
+    )
+    collisions: bpy.props.EnumProperty(
+        name="Same Name",
+        description="What happens to a layer of the target that has the name of one that is carried",
+        items=(
+            ("replace", "Replace", "It takes the carried values"),
+            ("number", "Keep Both", "It stays, and the carried layer gets a number, as in 'Group.001'"),
+        ),
+        default=_TRANSFER.collisions,
+    )
+    mix: bpy.props.EnumProperty(
+        name="Mix",
+        description="How weights, shapes, colors, masks and other interpolated values join those that are there",
+        items=(
+            ("replace", "Replace", "The carried value instead of the one that is there"),
+            ("add", "Add", "Their sum"),
+            ("subtract", "Subtract", "The one that is there less the carried one"),
+            ("multiply", "Multiply", "Their product"),
+        ),
+        default=_TRANSFER.mix,
+    )
+    mix_factor: bpy.props.FloatProperty(
+        name="Mix Factor",
+        description="How far to go from what is there to the result",
+        default=_TRANSFER.mix_factor,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    limit: bpy.props.IntProperty(
+        name="Limit Groups",
+        description="Keep the strongest so many of the carried vertex groups at each vertex; 0: all",
+        default=_TRANSFER.limit,
+        min=0,
+        soft_max=16,
+    )
+    normalize: bpy.props.BoolProperty(
+        name="Normalize",
+        description="Scale the carried weights of each vertex to the sum 1; locked groups of the target count and stay",
+        default=_TRANSFER.normalize,
+    )
+    smallest_weight: bpy.props.FloatProperty(
+        name="Smallest Weight",
+        description="Vertices with less weight than this do not become members of a vertex group",
+        default=_TRANSFER.smallest_weight,
+        min=0.0,
+        max=0.99,
+        soft_max=0.1,
+        precision=4,
+    )
+    target_mask: bpy.props.EnumProperty(
+        name="To", description="Which part of the target receives", items=_MASK_ITEMS, default=_TRANSFER.target_mask.by
+    )
+    target_mask_name: bpy.props.StringProperty(
+        name="Target Mask",
+        description="Vertex group or attribute of the target; what can be mixed is mixed by it, anything else is "
+        "carried to where it is at least half",
+        search=_nameable("target"),
+        search_options={"SUGGESTION"},
+    )
+    target_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the target receives")
+    unmatched: bpy.props.EnumProperty(
+        name="Unmatched",
+        description="What vertices get that correspond to nothing with certainty. 'Select Unmatched' shows them",
+        items=(
+            ("carry", "Carry Anyway", "What the map brings there, however uncertain"),
+            ("leave", "Leave", "They keep what they have"),
+            ("nearest", "Nearest", "The value of the nearest vertex that is matched, along the surface"),
+            ("fill", "Smooth Fill", "A harmonic fill between the matched vertices around; the nearest value where "
+             "values cannot be mixed"),
+        ),
+        default=_TRANSFER.unmatched,
+    )  # fmt: skip
+    evaluated: bpy.props.BoolProperty(
+        name="Evaluated Source",
+        description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
+        "original mesh. Modifiers that change its faces are refused",
+        default=_TRANSFER.evaluated,
     )
 
 
-def chosen_kinds(options: Any) -> list[str]:
-    """Return the identifiers of the chosen `KINDS` from an object that has `TransferOptions`."""
-    return [kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds]
+TRANSFER_OPTIONS = (*SourceMaskOptions.__annotations__, *TransferOptions.__annotations__)
+
+
+def source_mask(options: Any) -> Mask:
+    """Return the mask of the source from an object that has `SourceMaskOptions`."""
+    return Mask(options.source_mask, options.source_mask_name, options.source_mask_invert)
+
+
+def transfer_settings(options: Any) -> TransferSettings:
+    """Return the settings from an object that has `TransferOptions`."""
+    kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
+    receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
+    own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
+    own += ("unmatched", "evaluated")
+    names = split_names(options.layer_names)
+    masks = {"source_mask": source_mask(options), "target_mask": receives}
+    return TransferSettings(kinds=kinds, names=names, **masks, **{name: getattr(options, name) for name in own})

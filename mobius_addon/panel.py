@@ -9,7 +9,7 @@ from .operators.align import MOBIUS_OT_align
 from .operators.check import MOBIUS_OT_check
 from .operators.flatten import MOBIUS_OT_flatten
 from .operators.transfer import MOBIUS_OT_transfer
-from .options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
+from .options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, repair
 from .preferences import preferences
 from .usable import why_not
 
@@ -50,7 +50,8 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
 
         layout.separator()
         layout.column(align=True).prop(settings, "kinds")
-        layout.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER").kinds = settings.kinds
+        operator = layout.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER")
+        _hand_on(TRANSFER_OPTIONS, settings, operator)
         layout.separator()
         _hand_on(SCAN_OPTIONS, settings, layout.operator(MOBIUS_OT_flatten.bl_idname, icon="UV"))
 

@@ -12,8 +12,11 @@ from .access import (
     numbered,
 )
 from .carrier import Carrier
-from .plan import Carried, Transfer, plan_transfer
+from .masks import mask_names, mask_weights
+from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer
+from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
+from .unmatched import Unmatched, carrier_between, unmatched_vertices
 from .vertex_groups import VertexGroupAccess
 
 __all__ = [
@@ -30,9 +33,19 @@ __all__ = [
     "Carrier",
     "Kind",
     "Layer",
+    "Mask",
+    "Reading",
     "Row",
     "Transfer",
+    "TransferSettings",
+    "Unmatched",
     "VertexGroupAccess",
+    "carrier_between",
+    "mask_names",
+    "mask_weights",
     "numbered",
     "plan_transfer",
+    "read_transfer",
+    "split_names",
+    "unmatched_vertices",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, Protocol
@@ -49,15 +49,25 @@ class Layer:
 class Access(Protocol):
     """How one type of data is found on an object, read and written."""
 
-    def layers(self, obj: bpy.types.Object) -> Iterator[Layer]:
-        """Read every layer of this type, except those that are not the person's own content."""
+    @property
+    def domain(self) -> str:
+        """What elements of the mesh have a value: "POINT", "EDGE", "FACE" or "CORNER"."""
         ...
 
-    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str]) -> str | None:
+    def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
+        """Read the layers of this type whose names are chosen, except those that are not the person's own content."""
+        ...
+
+    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str], *, number: bool = False) -> str | None:
         """Return the name under which `write` will store a layer, or None where the person has locked it.
 
-        `reserved` are the names that other layers of the same transfer take.
+        `reserved` are the names that other layers of the same transfer take. With `number`, a layer that is there
+        already is not replaced: the name gets Blender's number.
         """
+        ...
+
+    def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
+        """Read those of the layers of these names that are there, if values of this type can be mixed."""
         ...
 
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
@@ -91,11 +101,11 @@ class AttributeAccess:
     dtype: str = "float32"
     only: frozenset[str] = frozenset()
 
-    def layers(self, obj: bpy.types.Object) -> Iterator[Layer]:
-        """Read every attribute of this type and domain."""
+    def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
+        """Read the chosen attributes of this type and domain."""
         for name in [a.name for a in obj.data.attributes if self._is_own_kind(a)]:
             general = name not in BUILT_IN and name not in OWN_NAMES and not name.startswith(".")
-            if name in self.only or (general and not self.only):
+            if name in self.only or (general and not self.only and chosen(name)):
                 yield Layer(name, self.read(obj, name))
 
     def read(self, obj: bpy.types.Object, name: str) -> Values:
@@ -105,20 +115,18 @@ class AttributeAccess:
             return np.array([getattr(item, self.prop) for item in data], object)
         return foreach(data, self.prop, self.width, np.dtype(self.dtype).type)
 
-    def changes(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans) -> bool:
-        """Return whether writing these values would change what is there; what is missing counts as zeros."""
-        attribute = obj.data.attributes.get(name)
-        if attribute is None or not self._is_own_kind(attribute):
-            return bool(values[covered].any())
-        return bool((self.read(obj, name)[covered] != values[covered].astype(self.dtype)).any())
+    def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
+        """Return the values of those of the attributes that are there with this type and domain."""
+        there = {a.name for a in obj.data.attributes if self._is_own_kind(a)}
+        return {name: self.read(obj, name) for name in names if name in there}
 
-    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str]) -> str:
-        """Return `name`, or Blender's way of numbering it if something else bears it."""
+    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str], *, number: bool = False) -> str:
+        """Return `name`, or Blender's way of numbering it if something else bears it, or anything with `number`."""
         attributes = obj.data.attributes
         groups = {group.name for group in obj.vertex_groups}
         for candidate in numbered(name):
             taken = attributes.get(candidate)
-            free = candidate not in groups if taken is None else self._is_own_kind(taken)
+            free = candidate not in groups if taken is None else self._is_own_kind(taken) and not number
             if free and candidate not in reserved:
                 return candidate
         raise AssertionError("numbers do not end")

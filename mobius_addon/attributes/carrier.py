@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from ...solver import Correspondence, interpolate, interpolate_corners
+from ...solver.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.interpolate import local_similarities, source_of_corners, source_of_edges, source_of_faces
 from ...solver.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
@@ -20,11 +21,21 @@ Values = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """A correspondence with the two surfaces it connects."""
+    """A correspondence with the two surfaces it connects.
+
+    Attributes
+    ----------
+    correspondence : Correspondence
+    source, target : Surface
+    gap : str
+        What vertices without a counterpart get: "leave", nothing; the value of the "nearest" that has one; a harmonic
+        "fill" between those, and the nearest where values cannot be mixed.
+    """
 
     correspondence: Correspondence
     source: Surface
     target: Surface
+    gap: Literal["leave", "nearest", "fill"] = "leave"
 
     def points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per vertex, (n_source, ...), linearly.
@@ -36,7 +47,7 @@ class Carrier:
         (n_target,) bool
             Where there is a value: the other vertices have no counterpart.
         """
-        return interpolate(self.correspondence, values), self.correspondence.face >= 0
+        return self._filled(interpolate(self.correspondence, values))
 
     def corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
@@ -49,15 +60,25 @@ class Carrier:
             self._polygon_of_triangle,
         )
         carried = carried.reshape(len(carried), *values.shape[1:])
-        corners = self.target.triangle_corners.ravel()
-        total = len(self.target.corner_vertex)
-        result = np.zeros((total, *carried.shape[1:]))
+        corners, vertex = self.target.triangle_corners.ravel(), self.target.corner_vertex
+        result = np.zeros((len(vertex), *carried.shape[1:]))
         result[corners] = carried
-        return result, self._whole_polygons[self.target.corner_polygon]
+        whole = self._whole_corners
+        if self.gap == "leave" or whole.all():
+            return result, whole
+        # around the gap each vertex gives the value of one of its corners beside it, never a mean across a seam
+        known = self.correspondence.face[vertex] >= 0
+        at_vertex = np.zeros((len(self.correspondence.face), *carried.shape[1:]))
+        at_vertex[vertex[known]] = result[known]
+        beside = known & ~whole
+        at_vertex[vertex[beside]] = result[beside]
+        at_vertex, reached = self._filled(at_vertex)
+        result[~known] = at_vertex[vertex[~known]]
+        return result, np.bincount(self.target.corner_polygon, ~reached[vertex])[self.target.corner_polygon] == 0
 
     def nearest_points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per vertex, (n_source, ...), each from the nearest vertex; returns as `points`."""
-        found = self.correspondence
+        found = self._everywhere.correspondence
         vertex = found.source_triangles[found.face, found.barycentric.argmax(axis=1)]
         return values[vertex], found.face >= 0
 
@@ -68,7 +89,7 @@ class Carrier:
 
     def turned_points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry quaternions per vertex, (n_source, 4), by their mean on the shorter way round; returns as `points`."""
-        found = self.correspondence
+        found = self._everywhere.correspondence
         corners = values[found.source_triangles[found.face]].astype(np.float64)
         nearest = corners[np.arange(len(corners)), found.barycentric.argmax(axis=1)]
         same_half = np.where(np.einsum("qkd,qd->qk", corners, nearest) < 0, -1.0, 1.0)
@@ -80,26 +101,84 @@ class Carrier:
 
     def nearest_corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), each from the nearest corner; returns as `points`."""
-        found = self._corner_origin
+        everywhere = self._everywhere
+        found = everywhere._corner_origin
         result = np.zeros((len(found), *values.shape[1:]), values.dtype)
         result[found >= 0] = values[found[found >= 0]]
-        return result, self._whole_polygons[self.target.corner_polygon]
+        return result, everywhere._whole_corners
 
     def faces(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per polygon, (p_source, ...), from the one that holds its middle; returns as `points`."""
-        origin = self._polygon_origin
+        origin = self._everywhere._polygon_origin
         return values[origin], origin >= 0
 
     def edges(self, values: Values) -> tuple[Values, Booleans]:
-        """Carry values per edge, (e_source, ...), from the edge that runs along it; returns as `points`."""
+        """Carry values per edge, (e_source, ...), from the edge that runs along it; returns as `points`.
+
+        Edges in a gap have none: a line that is nearest there would be drawn all over it.
+        """
         origin = self._edge_origin
         return values[origin], origin >= 0
 
     def displacements(self, values: Values) -> tuple[Values, Booleans]:
         """Carry vectors per vertex, (n_source, 3), turned and scaled with the surface; returns as `points`."""
-        carried, covered = self.points(values)
         rotation, scale = self._similarities
-        return np.einsum("nij,nj->ni", rotation, carried) * scale[:, None], covered
+        carried = interpolate(self.correspondence, values)
+        return self._filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
+
+    def normals(self, values: Values) -> tuple[Values, Booleans]:
+        """Carry unit vectors per face corner, (c_source, 3), turned with the surface; returns as `points`.
+
+        Those in a gap have none: Blender's own follow the surface there.
+        """
+        carried, _ = replace(self, gap="leave").corners(values)
+        turned = np.einsum("cij,cj->ci", self._similarities[0][self.target.corner_vertex], carried)
+        length = np.linalg.norm(turned, axis=1)
+        return np.divide(turned, length[:, None], out=turned, where=length[:, None] > 0), self._whole_corners & (
+            length > 0
+        )
+
+    def at(self, domain: str, weights: Floats) -> Floats:
+        """Return weights of the target's vertices, (n_target,), on another domain: their mean over each element."""
+        surface = self.target
+        if domain == "EDGE":
+            return weights[surface.edges].mean(axis=1)
+        if domain == "CORNER":
+            return weights[surface.corner_vertex]
+        if domain == "FACE":
+            sums = np.bincount(surface.corner_polygon, weights[surface.corner_vertex])
+            return sums / np.bincount(surface.corner_polygon)
+        return weights
+
+    def _filled(self, values: Values) -> tuple[Values, Booleans]:
+        """Return values per vertex with the gap filled if it is to be, and where there is a value."""
+        if self.gap == "leave" or (self.correspondence.face >= 0).all():
+            return values, self.reached
+        filled = values[self._nearest] if self.gap == "nearest" else self._fill(values)
+        return filled, self.reached
+
+    @cached_property
+    def reached(self) -> Booleans:
+        """Which target vertices, (n_target,), get a value."""
+        known = self.correspondence.face >= 0
+        if self.gap == "leave" or known.all():
+            return known
+        return self._nearest >= 0 if self.gap == "nearest" else self._fill.reached
+
+    @cached_property
+    def _fill(self) -> HarmonicFill:
+        return HarmonicFill.of(self.target.mesh, self.correspondence.face >= 0)
+
+    @cached_property
+    def _nearest(self) -> Integers:
+        return nearest_known(self.target.mesh, self.correspondence.face >= 0)
+
+    @cached_property
+    def _everywhere(self) -> Carrier:
+        """For values that cannot be mixed: the gap has the counterparts of the nearest vertices that have one."""
+        if self.gap == "leave":
+            return self
+        return replace(self, correspondence=with_nearest(self.correspondence, self._nearest), gap="leave")
 
     @cached_property
     def _similarities(self) -> tuple[Floats, Floats]:
@@ -114,6 +193,10 @@ class Carrier:
         """Which polygons have a counterpart at every corner: one is carried as a whole or not at all."""
         bare = self.correspondence.face[self.target.corner_vertex] < 0
         return np.bincount(self.target.corner_polygon, bare) == 0
+
+    @property
+    def _whole_corners(self) -> Booleans:
+        return self._whole_polygons[self.target.corner_polygon]
 
     @cached_property
     def _polygon_origin(self) -> Integers:

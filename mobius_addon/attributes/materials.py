@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from typing import Any
 
 import bpy
@@ -17,27 +17,39 @@ from .carrier import Values
 class MaterialAccess:
     """The material slot of each polygon; slots whose material the target does not have are added to it."""
 
-    def layers(self, obj: bpy.types.Object) -> Iterator[Layer]:
+    domain = "FACE"
+
+    def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
         """Read the slots, if there are any, as one layer."""
-        slots = [slot.material for slot in obj.material_slots]
+        slots = [_key(slot.material) for slot in obj.material_slots]
         if slots:
             index = foreach(obj.data.polygons, "material_index", 1, np.int32)
             yield Layer("Materials", np.minimum(index, len(slots) - 1), slots)
 
-    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str]) -> str:
+    def place(self, obj: bpy.types.Object, name: str, reserved: Set[str], *, number: bool = False) -> str:
         """Return `name`: slots have no name to collide."""
         return name
 
+    def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
+        """Return nothing: materials are not mixed."""
+        return {}
+
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
         """Add the materials that are used and missing, and set the slot of each polygon."""
-        slots = [slot.material for slot in obj.material_slots]
+        slots = [_key(slot.material) for slot in obj.material_slots]
         slot_of = np.zeros(len(about), np.int32)
         for number in np.unique(values[covered]).tolist():
             if about[number] not in slots:
-                obj.data.materials.append(about[number])
+                key = about[number]
+                obj.data.materials.append(None if key is None else bpy.data.materials.get(key))
                 slots.append(about[number])
             slot_of[number] = slots.index(about[number])
         stored = slot_of[values]
         stored[~covered] = foreach(obj.data.polygons, "material_index", 1, np.int32)[~covered]
         obj.data.polygons.foreach_set("material_index", stored)
         obj.data.update()
+
+
+def _key(material: bpy.types.Material | None) -> tuple[str, str | None] | None:
+    """Return how to find a material again, if nobody has removed it in the meantime; None for an empty slot."""
+    return None if material is None else (material.name, material.library.filepath if material.library else None)

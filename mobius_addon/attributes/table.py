@@ -12,6 +12,7 @@ from ...solver.mesh import Booleans
 from .access import FACE_SETS, SCULPT_MASK, SEAMS, SHARPNESS, SMOOTHNESS, Access, AttributeAccess
 from .carrier import Carrier, Values
 from .materials import MaterialAccess
+from .normals import NormalAccess
 from .shape_keys import ShapeKeyAccess
 from .vertex_groups import VertexGroupAccess
 
@@ -39,6 +40,7 @@ KINDS = (
     Kind("materials", "Materials", "The material of each face; materials that are missing are added as slots"),
     Kind("sharpness", "Edge Marks", "Sharp edges, creases and bevel weights"),
     Kind("smoothness", "Smooth Flags", "Whether faces are shaded smooth or flat"),
+    Kind("normals", "Custom Normals", "Normals of face corners, turned with the surface"),
     Kind("face-sets", "Face Sets", "Sculpt Mode's face sets"),
     Kind("mask", "Sculpt Masks", "Sculpt Mode's mask"),
     Kind(
@@ -54,11 +56,20 @@ Carry = Callable[[Carrier, Values], tuple[Values, Booleans]]
 
 @dataclass(frozen=True)
 class Row:
-    """One type of data on one domain: the kind that chooses it, who reads and writes it, and how it is carried."""
+    """One type of data on one domain: the kind that chooses it, who reads and writes it, and how it is carried.
+
+    `mixes` says whether values can be mixed with those that are there; any others are replaced or not.
+    """
 
     kind: str
     access: Access
     carry: Carry
+    mixes: bool = False
+
+    @property
+    def marks(self) -> bool:
+        """Whether this is something that a mesh has once under a name of Blender's own, as seams and masks."""
+        return isinstance(self.access, AttributeAccess) and bool(self.access.only)
 
 
 # data type: what foreach_get calls it, numbers per element, numpy's type, how it is carried on points and on corners
@@ -87,12 +98,13 @@ _SPECIAL_KIND = {
 def _row(kind: str, data_type: str, domain: str, only: frozenset[str] = frozenset()) -> Row:
     prop, width, dtype, on_points, on_corners = _TYPES[data_type]
     carry = {"POINT": on_points, "EDGE": Carrier.edges, "FACE": Carrier.faces, "CORNER": on_corners}[domain]
-    return Row(kind, AttributeAccess(data_type, domain, prop, width, dtype, only), carry)
+    mixes = kind != "uv" and carry in (Carrier.points, Carrier.corners)
+    return Row(kind, AttributeAccess(data_type, domain, prop, width, dtype, only), carry, mixes)
 
 
 ROWS = (
-    Row("vertex-groups", VertexGroupAccess(), Carrier.points),
-    Row("shape-keys", ShapeKeyAccess(), Carrier.displacements),
+    Row("vertex-groups", VertexGroupAccess(), Carrier.points, mixes=True),
+    Row("shape-keys", ShapeKeyAccess(), Carrier.displacements, mixes=True),
     Row("materials", MaterialAccess(), Carrier.faces),
     _row("seams", "BOOLEAN", "EDGE", SEAMS),
     _row("sharpness", "BOOLEAN", "EDGE", SHARPNESS),
@@ -106,4 +118,6 @@ ROWS = (
         for data_type in _TYPES
         for domain in ("POINT", "EDGE", "FACE", "CORNER")
     ),
+    # last, since sharp edges and flat faces decide what normals can be
+    Row("normals", NormalAccess(), Carrier.normals),
 )

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ... import solver
 from .. import stored_alignment
-from ..attributes import KINDS, Carrier, plan_transfer
+from ..attributes import Carrier, plan_transfer
 from ..command_line import DONE, say, say_error
 from ..files import Unreadable, new_scene, outputs, quiet
 from ..mesh_data import Refusal, Surface, read_surface
@@ -70,8 +70,7 @@ def run(output_dir: Path) -> int:
         with timed(seconds, "correspond"):
             correspondence = solver.correspond(alignment)
         with timed(seconds, "transfer"):
-            kinds = [kind.identifier for kind in KINDS]
-            plan = plan_transfer(source, target, Carrier(correspondence, *surfaces), kinds)
+            plan = plan_transfer(source, target, Carrier(correspondence, *surfaces))
             plan.write(target)
             write_alignment(source, target, alignment, correspondence, surfaces)
         for warning in (*alignment.warnings, *plan.warnings):

@@ -1,50 +1,146 @@
-"""Carry data from the source to the target through the last alignment."""
+"""Carry data from the source to the target, or to many targets, through their last alignments."""
+
+# no postponed annotations here: Blender reads the properties from them
+from contextlib import nullcontext
+from typing import Any
 
 import bpy
 
-from ...solver import MeshError
 from .. import stored_alignment
-from ..attributes import KINDS, Carrier, plan_transfer
-from ..mesh_data import Refusal, read_surface
-from ..options import TransferOptions, chosen_kinds
-from ..usable import why_not_pair
+from ..attributes import (
+    KINDS,
+    Reading,
+    Transfer,
+    TransferSettings,
+    carrier_between,
+    mask_weights,
+    read_transfer,
+)
+from ..evaluated import evaluated, evaluated_surface
+from ..jobs import JobOperator, Report, Work
+from ..mesh_data import Refusal, Surface, read_surface
+from ..options import TransferOptions, transfer_settings
+from ..usable import why_not, why_not_pair
 
 
-class MOBIUS_OT_transfer(TransferOptions, bpy.types.Operator):
+class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
     """Carry everything that is on the source, of the chosen kinds, to the target through their alignment."""
 
     bl_idname = "mobius.transfer"
     bl_label = "Transfer"
     bl_options = {"REGISTER", "UNDO"}
+    job_title = "Transfer"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Allow for two meshes in Object Mode that have been aligned."""
+        """Allow for two meshes in Object Mode that have been aligned, or a source with selected others that have."""
         settings = context.scene.mobius
         reason = why_not_pair(settings, context.scene, writes_source=False)
         if reason is None and not stored_alignment.exists(settings.target, settings.source):
             reason = stored_alignment.missing(settings.target, settings.source)
+        if context.window_manager.mobius_job.running:
+            reason = "Other work is running: press ESC to stop it"
         if reason:
             cls.poll_message_set(reason)
         return not reason
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Compute everything, then write it."""
-        source, target = context.scene.mobius.source, context.scene.mobius.target
-        try:
-            if not self.kinds:
-                raise Refusal("Choose at least one kind of data to transfer")
+    def prepare(self, context: bpy.types.Context) -> Work:
+        """Read source and targets."""
+        scene, settings = context.scene, transfer_settings(self)
+        if not settings.kinds:
+            raise Refusal("Choose at least one kind of data to transfer")
+        source = scene.mobius.source
+        targets = [scene.mobius.target]
+        if self.targets == "selected":
+            targets = selected_targets(context, source)
+        self._targets: list[tuple[str, Surface]] = []
+        readings: list[Reading] = []
+        for target in targets:
             surfaces = read_surface(source), read_surface(target)
-            correspondence = stored_alignment.load(target, source, surfaces)
-            plan = plan_transfer(source, target, Carrier(correspondence, *surfaces), chosen_kinds(self))
-        except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        plan.write(target)
-        for warning in plan.warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"'{target.name}' has {describe_counts(plan.counts())} from '{source.name}'")
-        return {"FINISHED"}
+            readings.append(read_pair(source, target, surfaces, settings))
+            self._targets.append((target.name, surfaces[1]))
+
+        def work(report: Report) -> list[Transfer]:
+            return [reading.carry(report) for reading in readings]
+
+        self._source = source.name
+        return work
+
+    def finish(self, context: bpy.types.Context, result: Any) -> None:
+        """Write on every target, if they are still what was read."""
+        objects = []
+        for name, surface in self._targets:
+            obj = bpy.data.objects.get(name)
+            if obj is None or why_not(obj, "target mesh", context.scene) is not None:
+                raise Refusal(f"'{name}' was removed or is being edited since the transfer began: transfer again")
+            if read_surface(obj).fingerprint() != surface.fingerprint():
+                raise Refusal(f"'{name}' was edited during the transfer: transfer again")
+            objects.append(obj)
+        for obj, plan in zip(objects, result, strict=True):
+            plan.write(obj)
+            for warning in plan.warnings:
+                self.report({"WARNING"}, warning)
+            counts, remark = describe_counts(plan.counts()), plan.unmatched.remark()
+            self.report({"INFO"}, f"'{obj.name}' has {counts} from '{self._source}'{remark}")
+
+
+def read_pair(
+    source: bpy.types.Object, target: bpy.types.Object, surfaces: tuple[Surface, Surface], settings: TransferSettings
+) -> Reading:
+    """Read a source and a target that keeps an alignment with it.
+
+    Raises
+    ------
+    Refusal
+        As `stored_alignment.load` and `read_through`.
+    """
+    return read_through(source, target, surfaces, stored_alignment.load(target, source, surfaces), settings)
+
+
+def read_through(
+    source: bpy.types.Object,
+    target: bpy.types.Object,
+    surfaces: tuple[Surface, Surface],
+    correspondence: Any,
+    settings: TransferSettings,
+) -> Reading:
+    """Read a source and a target for a transfer through a correspondence between them.
+
+    Raises
+    ------
+    Refusal
+        As `mask_weights`, `evaluated` and `read_transfer`.
+    """
+    with evaluated(source) if settings.evaluated else nullcontext() as shown:
+        seen = surfaces[0] if shown is None else evaluated_surface(shown, surfaces[0])
+        gives = mask_weights(shown or source, settings.source_mask)
+        carrier, unmatched = carrier_between(correspondence, seen, surfaces[1], settings.unmatched, gives)
+        influence = mask_weights(target, settings.target_mask)
+        return read_transfer(
+            source, target, carrier, settings, shown_source=shown, influence=influence, unmatched=unmatched
+        )
+
+
+def selected_targets(context: bpy.types.Context, source: bpy.types.Object) -> list[bpy.types.Object]:
+    """Return the selected meshes other than the source; all of them have been aligned with it.
+
+    Raises
+    ------
+    Refusal
+        None is selected, one has not been aligned, cannot be written or shares its mesh with another.
+    """
+    targets = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source]
+    if not targets:
+        raise Refusal(f"Select the meshes that shall receive what is on '{source.name}'")
+    for obj in targets:
+        if reason := why_not(obj, "target mesh", context.scene):
+            raise Refusal(reason)
+        if not stored_alignment.exists(obj, source):
+            raise Refusal(stored_alignment.missing(obj, source))
+    for obj in targets:
+        if twin := next((x for x in (source, *targets) if x != obj and x.data == obj.data), None):
+            raise Refusal(f"'{obj.name}' and '{twin.name}' share one mesh: deselect one or make it single-user")
+    return targets
 
 
 def describe_counts(counts: dict[str, int]) -> str:

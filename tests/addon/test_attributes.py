@@ -14,6 +14,7 @@ from mobius_extension.mobius_addon.attributes import (  # noqa: E402
     AttributeAccess,
     Carrier,
     Transfer,
+    TransferSettings,
     plan_transfer,
 )
 from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
@@ -65,7 +66,7 @@ def carrier(source: Any, target: Any, bare: slice = slice(0)) -> Carrier:
 
 
 def transfer(source: Any, target: Any, kinds: list[str] = ALL, bare: slice = slice(0)) -> Transfer:
-    plan = plan_transfer(source, target, carrier(source, target, bare), kinds)
+    plan = plan_transfer(source, target, carrier(source, target, bare), TransferSettings(kinds=tuple(kinds)))
     plan.write(target)
     return plan
 
@@ -196,14 +197,14 @@ def test_a_ninth_uv_map_is_refused_before_anything_is_written() -> None:
         target.data.uv_layers.new(name=f"UV {number}")
     before = everything(target)
     with pytest.raises(Refusal, match="'Target' would have 9 UV maps and Blender allows 8"):
-        plan_transfer(source, target, carrier(source, target), ALL)
+        plan_transfer(source, target, carrier(source, target))
     assert everything(target) == before
 
 
 def test_a_source_without_anything_to_carry_is_refused() -> None:
     source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
     with pytest.raises(Refusal, match="'Source' has no vertex groups or UV maps to transfer"):
-        plan_transfer(source, target, carrier(source, target), ["vertex-groups", "uv"])
+        plan_transfer(source, target, carrier(source, target), TransferSettings(kinds=("vertex-groups", "uv")))
 
 
 def test_what_rendered_on_the_source_renders_on_a_target_that_had_nothing() -> None:

@@ -9,7 +9,7 @@ from test_attributes import flat, transfer
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon.attributes import Carrier, plan_transfer  # noqa: E402
+from mobius_extension.mobius_addon.attributes import Carrier, TransferSettings, plan_transfer  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 from mobius_extension.solver import Correspondence  # noqa: E402
 
@@ -78,7 +78,7 @@ def test_a_shape_turns_and_grows_with_the_surface(mirrored: bool) -> None:
     target.data.update()
     displacement = np.random.default_rng(2).normal(size=(81, 3))
     add_key(source, "Smile", displacement)
-    plan_transfer(source, target, same_vertices(source, target), ["shape-keys"]).write(target)
+    plan_transfer(source, target, same_vertices(source, target), TransferSettings(kinds=("shape-keys",))).write(target)
     arrived = shape(target, "Smile") - positions(target)
     assert np.abs(arrived - 3 * displacement @ turn.T @ flip).max() < 1e-4
 
@@ -107,7 +107,7 @@ def test_locked_keys_and_vertices_without_counterpart_stay_as_they_are() -> None
 def test_a_shape_on_a_bent_surface_keeps_its_height_over_it() -> None:
     source, target = make_sheet("Source", 21, flat), make_sheet("Target", 21, lambda x, y: 2 * bumps(x, y))
     add_key(source, "Up", np.tile([0.0, 0.0, 0.1], (441, 1)))
-    plan_transfer(source, target, same_vertices(source, target), ["shape-keys"]).write(target)
+    plan_transfer(source, target, same_vertices(source, target), TransferSettings(kinds=("shape-keys",))).write(target)
     arrived = shape(target, "Up") - positions(target)
     normal = np.array([vertex.normal[:] for vertex in target.data.vertices])
     length = np.linalg.norm(arrived, axis=1)

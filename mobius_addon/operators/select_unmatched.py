@@ -1,0 +1,58 @@
+"""Select what of the target corresponds to nothing with certainty."""
+
+# no postponed annotations here: Blender reads the properties from them
+import bpy
+import numpy as np
+
+from ...solver import MeshError
+from ...solver.mesh import plural
+from .. import stored_alignment
+from ..attributes import mask_weights, unmatched_vertices
+from ..mesh_data import Refusal, foreach, read_surface
+from ..options import SourceMaskOptions, source_mask
+from ..usable import why_not_pair
+from .check import select_vertices
+
+
+class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
+    """Select the vertices of the target that have no certain counterpart on the source, for Edit Mode."""
+
+    bl_idname = "mobius.select_unmatched"
+    bl_label = "Select Unmatched"
+    bl_options = {"REGISTER", "UNDO"}
+
+    extend: bpy.props.BoolProperty(
+        name="Extend", description="Add to what is selected already", default=False, options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Allow for two meshes in Object Mode that have been aligned."""
+        settings = context.scene.mobius
+        reason = why_not_pair(settings, context.scene, writes_source=False)
+        if reason is None and not stored_alignment.exists(settings.target, settings.source):
+            reason = stored_alignment.missing(settings.target, settings.source)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Select, and report how much of the target it is."""
+        source, target = context.scene.mobius.source, context.scene.mobius.target
+        try:
+            surfaces = read_surface(source), read_surface(target)
+            found = stored_alignment.load(target, source, surfaces)
+            unmatched = unmatched_vertices(found, surfaces[1], mask_weights(source, source_mask(self)))
+        except (Refusal, MeshError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        chosen = unmatched
+        if self.extend:
+            chosen = unmatched | foreach(target.data.vertices, "select", 1, np.bool_)
+        select_vertices(target.data, chosen)
+        context.tool_settings.mesh_select_mode = (True, False, False)
+        number = plural(int(unmatched.sum()), "vertex")
+        share = surfaces[1].mesh.vertex_areas[unmatched].sum() / surfaces[1].mesh.area
+        verb = "has" if unmatched.sum() == 1 else "have"
+        self.report({"INFO"}, f"{number} of '{target.name}' ({share:.1%} of its area) {verb} no certain counterpart")
+        return {"FINISHED"}
