@@ -51,6 +51,8 @@ def line(row: Row) -> str:
     pair, measured, facts = row.pair, row.score, row.found.facts
     marks = "" if measured.marks is None else f"{measured.marks:2d}/{measured.of}"
     said = []
+    if measured.overlooked is not None:
+        said.append(f"overlooked {measured.overlooked:.0f} %, doubted {measured.doubted:.0f} %")
     if "certified" in facts:
         said.append("proved" if facts["certified"] else "NOT PROVED")
     if "reflected" in facts and facts["reflected"] != pair.reflected:

@@ -12,7 +12,7 @@ from solver.surface_points import SurfacePoints
 from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import posed
 
-from .bent import bent_pieces
+from .bent import bent_pieces, piece
 from .decimation import decimated
 from .store import Store, digest
 
@@ -62,6 +62,8 @@ class Pair:
         Whether the true map turns orientation round.
     openings : bool
         Whether the surfaces have openings.
+    beyond : Places or None
+        Points of the target that the source has no counterpart of; their truth lies beyond its edge.
     """
 
     kind: str
@@ -72,6 +74,7 @@ class Pair:
     landmarks: Places | None
     reflected: bool = False
     openings: bool = False
+    beyond: Places | None = None
 
     @property
     def known(self) -> Places:
@@ -132,20 +135,34 @@ class Shape:
     openings: bool = False
 
 
-def pair(kind: str, source: Shape, target: Shape, dense: bool, seed: int, store: Store) -> Pair:
+CLOSE_TO_EDGE = 0.02
+"""Share of the diagonal: points that belong so little beyond the source's edge count neither as on it nor as beyond."""
+
+
+def pair(
+    kind: str,
+    source: Shape,
+    target: Shape,
+    dense: bool,
+    seed: int,
+    store: Store,
+    *,
+    source_part: TriangleMesh | None = None,
+    target_part: TriangleMesh | None = None,
+) -> Pair:
     """Decimate and pose the target and carry the truth along.
 
     A point of the decimated surface means the nearest one of the surface it was decimated from, and so the point in
-    the same place of the same triangle of the source.
+    the same place of the same triangle of the source. Of either side a part may be all that is shown.
     """
-    whole = target.mesh
+    whole, part, shown = target.mesh, target_part or target.mesh, source_part or source.mesh
     few = store.kept(
-        f"decimated {whole.name} {digest(whole.vertices, whole.faces, KEPT)}",
-        lambda: dict(zip(("vertices", "faces"), _arrays(decimated(whole, KEPT)), strict=True)),
+        f"decimated {part.name} {digest(part.vertices, part.faces, KEPT)}",
+        lambda: dict(zip(("vertices", "faces"), _arrays(decimated(part, KEPT)), strict=True)),
     )
-    small = TriangleMesh(few["vertices"], few["faces"], whole.name)
+    small = TriangleMesh(few["vertices"], few["faces"], part.name)
     on_whole = surface_points(whole)
-    surface = landmarks = None
+    surface = landmarks = beyond = None
     if dense:
         rng = np.random.default_rng(seed)
         face = rng.choice(len(small.faces), POINTS, p=small.face_areas / small.area)
@@ -155,6 +172,11 @@ def pair(kind: str, source: Shape, target: Shape, dense: bool, seed: int, store:
         there, weights = nearest(on_whole, position, normal)
         truth = np.einsum("qk,qkd->qd", weights, source.mesh.vertices[source.mesh.faces[there]])
         good = np.ones(POINTS, bool) if target.known is None else target.known[there]
+        if source_part is not None:
+            gap = _distance(shown, truth) / source.mesh.diagonal
+            far = good & (gap > CLOSE_TO_EDGE)
+            beyond = Places(face[far], barycentric[far], truth[far])
+            good &= gap < 1e-6
         surface = Places(face[good], barycentric[good], truth[good])
     if source.landmarks is not None and target.landmarks is not None:
         normals = whole.vertex_normals()[target.landmarks]
@@ -162,14 +184,22 @@ def pair(kind: str, source: Shape, target: Shape, dense: bool, seed: int, store:
         landmarks = Places(there, weights, source.mesh.vertices[source.landmarks])
     return Pair(
         kind,
-        f"{source.mesh.name} > {whole.name}",
-        source.mesh,
+        f"{shown.name} > {part.name}",
+        shown,
         posed(small, seed),
         surface,
         landmarks,
         source.handedness != target.handedness,
         source.openings,
+        beyond,
     )
+
+
+def _distance(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
+    """Return how far points, (q, 3), lie from a mesh, (q,)."""
+    onto = SurfacePoints(mesh, topology(mesh).boundary_loops, 0.0)
+    face, weights = nearest(onto, points, np.zeros_like(points))
+    return np.linalg.norm(np.einsum("qk,qkd->qd", weights, mesh.vertices[mesh.faces[face]]) - points, axis=1)
 
 
 def _arrays(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
@@ -259,6 +289,36 @@ def _bent(store: Store, count: int | None) -> Iterator[Pair]:
         yield pair("bent", Shape(bent), Shape(rest), True, 2 * k + 1, store)
 
 
+PARTIAL = (
+    (simpop, "01", "10", (0, -1, 0), 0.15),
+    (simpop, "02", "15", (1, 0, 0), 0.15),
+    (simpop, "20", "30", (0, 1, 0), 0.15),
+    (simpop, "10", "01", (0, -1, 0), 0.3),
+    (ict, "M_neutral", "F_neutral", (0, -1, 0), 0.15),
+    (ict, "M_sad_level2", "M_happy_level1", (-1, 0, 0), 0.3),
+    (brain, "left", "right", (0, 1, 0), 0.15),
+)
+"""Shape, source, target, the direction in which one side is cut short, and the share of its area that goes."""
+
+
+def _partial(store: Store, count: int | None) -> Iterator[Pair]:
+    """Yield pairs of which first the source, then the target is cut short."""
+    for k, (shape, a, b, direction, share) in enumerate(PARTIAL[:count]):
+        source, target = shape(a), shape(b)
+        cut = _cut(source.mesh, np.array(direction, float), share)
+        yield pair("partial", source, target, True, 2 * k, store, source_part=cut)
+        yield pair("partial", target, source, True, 2 * k + 1, store, target_part=cut)
+
+
+def _cut(mesh: TriangleMesh, direction: np.ndarray, share: float) -> TriangleMesh:
+    """Return the mesh without the `share` of its area that lies farthest in a direction."""
+    height = mesh.vertices[mesh.faces].mean(axis=1) @ direction
+    order = np.argsort(-height)
+    stays = np.ones(len(height), bool)
+    stays[order[np.cumsum(mesh.face_areas[order]) < share * mesh.area]] = False
+    return piece(mesh, stays, f"{mesh.name} less {100 * share:.0f} %")
+
+
 SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
     "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
@@ -267,5 +327,6 @@ SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "hard-teeth": _of("hard-teeth", HARD_TEETH, tooth, False, "teeth/landmarks.json"),
     "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
     "bent": _bent,
+    "partial": _partial,
 }
 """Each set by its name: pairs in both directions, of the first `count` if given."""

@@ -33,7 +33,7 @@ def sheet(path: Path, rows: list[Row]) -> None:
             marks = "" if row.score.marks is None else f", {row.score.marks}/{row.score.of}"
             ax.set_title(f"{TITLES[name].replace('*', '')}\n{row.score.mean:.2f} %{marks}", fontsize=7)
         line[0].text(-0.05, 0.5, pair.name, rotation=90, ha="right", va="center", transform=line[0].transAxes)
-    scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, WORST), "magma")
+    scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, WORST), "YlOrRd")
     figure.colorbar(scale, ax=axes, shrink=0.5, label="error, % of the diagonal", extend="max")
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -45,11 +45,11 @@ def _errors(ax: Any, row: Row) -> None:
     seen = source.vertices @ view.T
     corners = seen[source.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    light = 0.45 + 0.55 * np.abs(normal @ [0.3, 0.3, 0.9]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
+    light = 0.35 + 0.65 * np.abs(normal @ [0.3, 0.3, 0.9]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
     error = errors(pair, row.found, pair.known)
     if pair.surface is not None:
         near = KDTree(pair.surface.truth).query(source.vertices[source.faces].mean(axis=1), k=3)[1]
-        colour = plt.get_cmap("magma")(np.clip(error[near].mean(axis=1) / WORST, 0, 1))[:, :3] * light[:, None]
+        colour = plt.get_cmap("YlOrRd")(np.clip(error[near].mean(axis=1) / WORST, 0, 1))[:, :3] * light[:, None]
     else:
         colour = np.repeat(light[:, None], 3, axis=1) * 0.95
     order = np.argsort(corners[:, :, 2].mean(axis=1))
@@ -63,7 +63,7 @@ def _errors(ax: Any, row: Row) -> None:
         ax.add_collection(
             LineCollection(list(np.stack([found, true], axis=1)[:, :, :2]), colors="black", linewidths=0.8)
         )
-        ax.scatter(*true[:, :2].T, s=9, c=np.clip(error / WORST, 0, 1), cmap="magma", vmin=0, vmax=1, zorder=3)
+        ax.scatter(*true[:, :2].T, s=9, c=np.clip(error / WORST, 0, 1), cmap="YlOrRd", vmin=0, vmax=1, zorder=3)
     ax.autoscale()
     ax.set_aspect("equal")
     ax.axis("off")

@@ -47,6 +47,10 @@ class Score:
         Landmark pairs.
     folded : float
         Triangles of the target that are turned over or collapsed in the source's disc, in %.
+    doubted : float or None
+        Points that have a counterpart and a confidence below 1/2, in %; None if the method has no confidence.
+    overlooked : float or None
+        Points that have no counterpart and a confidence of 1/2 or more, in %; None if all have one.
     """
 
     mean: float
@@ -54,6 +58,8 @@ class Score:
     marks: int | None
     of: int | None
     folded: float
+    doubted: float | None
+    overlooked: float | None
 
 
 def errors(pair: Pair, found: Map, places: Places) -> np.ndarray:
@@ -74,7 +80,14 @@ def score(pair: Pair, found: Map) -> Score:
         marks,
         None if pair.landmarks is None else len(pair.landmarks.face),
         100 * float((way * areas <= 0).mean()),
+        None if found.confidence is None else 100 - _trusted(pair, found, pair.known),
+        None if found.confidence is None or pair.beyond is None else _trusted(pair, found, pair.beyond),
     )
+
+
+def _trusted(pair: Pair, found: Map, places: Places) -> float:
+    """Return how many of the points, in %, have a confidence of 1/2 or more."""
+    return 100 * float((places.carried(pair.target, found.confidence) >= 0.5).mean())
 
 
 def mutually_nearest(pair: Pair, found: Map, landmarks: Places) -> int:
