@@ -6,23 +6,27 @@ No module here holds mathematics: each reads arrays from Blender, calls `solver`
 from importlib import import_module
 
 # in the order in which they register; each has `register` and `unregister`
-_MODULES = ("preferences", "properties", "operators", "panel", "command_line")
+_TOOLS = ("preferences", "properties", "operators", "panel", "command_line")
+_INSTEAD = ("absent",)
+_registered: list[str] = []
 
 
 def register() -> None:
-    """Register every class, property and command; nothing stays registered if one of them fails."""
-    done: list[str] = []
+    """Register every class, property and command; nothing stays registered if one of them fails.
+
+    Where scipy cannot be loaded, a panel that says so takes the place of all others.
+    """
+    absent = import_module(".absent", __package__)
     try:
-        for name in _MODULES:
+        for name in _INSTEAD if absent.reasons() else _TOOLS:
             import_module(f".{name}", __package__).register()
-            done.append(name)
+            _registered.append(name)
     except BaseException:
-        for name in reversed(done):
-            import_module(f".{name}", __package__).unregister()
+        unregister()
         raise
 
 
 def unregister() -> None:
     """Undo `register`."""
-    for name in reversed(_MODULES):
-        import_module(f".{name}", __package__).unregister()
+    while _registered:
+        import_module(f".{_registered.pop()}", __package__).unregister()
