@@ -2,13 +2,12 @@
 
 import hashlib
 import subprocess
-import sys
 import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from zips import ROOT, build_module, run_build
 
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 PLATFORMS = MANIFEST["platforms"]
@@ -61,9 +60,8 @@ def test_every_wheel_of_the_manifest_is_pinned_or_ours_and_none_is_numpy() -> No
 
 @pytest.mark.parametrize("platform", PLATFORMS)
 def test_every_platform_has_its_kernels_and_scipy(platform: str) -> None:
-    from mobius_extension.release.build import runs_on
-
-    mine = [Path(wheel).name for wheel in MANIFEST["wheels"] if runs_on(Path(wheel).name, platform)]
+    names = [Path(wheel).name for wheel in MANIFEST["wheels"]]
+    mine = [name for name in names if build_module().runs_on(name, platform)]
     kinds = {(name.split("-")[0], name.split("-")[2]) for name in mine}
     # Blender for Intel Macs ended with Python 3.11
     pythons = ["cp311"] if platform == "macos-x64" else ["cp311", "cp313"]
@@ -71,44 +69,62 @@ def test_every_platform_has_its_kernels_and_scipy(platform: str) -> None:
     assert len(mine) == len(kinds)
 
 
-def test_what_lies_about_is_not_packed(built: Path, tmp_path: Path) -> None:
-    """A wheel, a cache and notes in the project's folder stay out of the zip."""
-    strays = [ROOT / "wheels/stray-1.0-py3-none-any.whl", ROOT / "stray.npz", ROOT / "solver/stray.txt"]
-    before = names_in(built)
-    try:
-        for stray in strays:
-            stray.write_text("stray")
-        (again,) = build_again(tmp_path)
-    finally:
-        for stray in strays:
-            stray.unlink()
-    assert names_in(again) == before
+def git(folder: Path, *arguments: str) -> None:
+    subprocess.run(["git", "-C", folder, *arguments], check=True, capture_output=True)
 
 
-def names_in(path: Path) -> list[str]:
-    with zipfile.ZipFile(path) as archive:
-        return sorted(archive.namelist())
-
-
-def build_again(folder: Path) -> list[Path]:
-    from conftest import build
-
-    from solver.kernels.build_wheel import this_platform
-
-    return build(folder, this_platform())
+@pytest.mark.parametrize("known_to_git", [True, False])
+def test_what_lies_about_is_not_packed(known_to_git: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project, staged = tmp_path / "project", tmp_path / "staged"
+    kept = ["__init__.py", "solver/mesh.py"]
+    strays = ["wheels/stray-1.0-py3-none-any.whl", "solver/__pycache__/mesh.cpython-311.pyc", ".venv/x.py"]
+    unknown = ["demo/scene.blend", "solver/notes.txt"]
+    for name in [*kept, *strays, *unknown]:
+        (project / name).parent.mkdir(parents=True, exist_ok=True)
+        (project / name).write_text(name)
+    if known_to_git:
+        git(project, "init")
+        git(project, "add", *kept)
+    monkeypatch.setattr(build_module(), "ROOT", project)
+    build_module().copy_project(staged)
+    found = sorted(path.relative_to(staged).as_posix() for path in staged.rglob("*") if path.is_file())
+    assert found == sorted(kept if known_to_git else [*kept, *unknown])
 
 
 # refusals
 
 
-def run_build(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(ROOT), "build", *arguments], capture_output=True, text=True, check=False
-    )
-
-
 def test_an_unknown_platform_is_wrong_usage(tmp_path: Path) -> None:
-    done = run_build("amiga", "-o", str(tmp_path / "dist"))
+    done = run_build("amiga", "-o", tmp_path / "dist")
     assert done.returncode == 2
     assert f"unknown platform amiga: take {', '.join(PLATFORMS)}" in done.stderr
     assert not (tmp_path / "dist").exists()
+
+
+def test_a_wheel_that_is_not_pinned_is_refused() -> None:
+    build = build_module()
+    with pytest.raises(build.BuildError, match=r"release/wheels.sha256 has no hash for it"):
+        build.pinned("scipy-9.9.9-cp311-cp311-win_amd64.whl")
+
+
+def test_a_wheel_with_another_hash_is_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    build = build_module()
+    name = "scipy-1.15.3-cp311-cp311-win_amd64.whl"
+    monkeypatch.setattr(build, "WHEELS", tmp_path / "wheels")
+    monkeypatch.setattr(build, "HASHES", tmp_path / "hashes")
+    build.WHEELS.mkdir()
+    build.HASHES.write_text(f"{'0' * 64}  {name}\n")
+    (build.WHEELS / name).write_bytes(b"not scipy")
+    # pip has a folder with a wheel of that name and nothing else, so that no network is needed
+    (tmp_path / "offered").mkdir()
+    (tmp_path / "offered" / name).write_bytes(b"not scipy either")
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "offered"))
+    with pytest.raises(build.BuildError, match=r"HASH"):
+        build.get_wheels([name], "windows-x64")
+
+
+def test_what_blenders_builder_says_reaches_the_person(tmp_path: Path) -> None:
+    build = build_module()
+    with pytest.raises(build.BuildError, match=r"blender_manifest.toml"):
+        build.run(*build.blenders_builder(), "validate", tmp_path)
