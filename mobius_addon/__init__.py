@@ -6,7 +6,19 @@ No module here holds mathematics: each reads arrays from Blender, calls `solver`
 from importlib import import_module
 
 # in the order in which they register; each has `register` and `unregister`
-_TOOLS = ("preferences", "properties", "operators", "panel", "command_line")
+_TOOLS = (
+    "edits",
+    "topology_cache",
+    "overlay",
+    "preferences",
+    "properties",
+    "jobs",
+    "operators",
+    "preset_menus",
+    "panel",
+    "translation",
+    "command_line",
+)
 _INSTEAD = ("absent",)
 _registered: list[str] = []
 

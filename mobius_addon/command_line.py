@@ -135,7 +135,9 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         "--method", choices=("harmonic", "mid-edge"), default="harmonic", help="how to flatten; default: %(default)s"
     )
     flatten.add_argument(
-        "--distortion", choices=("dilatation", "factor"), help="write this as the color attribute 'Mobius Distortion'"
+        "--distortion",
+        choices=("dilatation", "factor"),
+        help="write this as the color attribute 'Mobius Disc Angles' or 'Mobius Disc Sizes'",
     )
     repair = flatten.add_argument_group("scans")
     _add_repair_options(repair)
@@ -314,23 +316,23 @@ def _flatten(options: argparse.Namespace) -> int:
 
     from .attributes import DISC_LAYOUT
     from .computation import Repair, flattened
-    from .distortion_color import MEASURES
     from .files import export_mesh, import_mesh, new_scene, outputs
+    from .heat_maps import DISC_MEASURES, measure
     from .mesh_data import read_surface
-    from .results import DISTORTION_COLOR, require_room, write_color, write_layout
+    from .results import require_room, write_color, write_layout
 
     _require_writable(meshes=[options.output], others=[options.report])
     new_scene()
     obj = import_mesh(options.mesh).obj
     surface = read_surface(obj, options.mesh)
-    measure = next((x for x in MEASURES if x.identifier == options.distortion), None)
-    require_room(obj, [DISC_LAYOUT], [DISTORTION_COLOR] if measure else [])
+    shown = measure(options.distortion, DISC_MEASURES) if options.distortion else None
+    require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])
     _require_outer(options.outer, options, "--outer", surface)
     repair = Repair(options.fill_holes, options.largest_part)
     flattening, notes = flattened(surface.mesh, options.method, repair, outer=options.outer)
     write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
-    if measure:
-        write_color(obj, DISTORTION_COLOR, *measure.color(flattening))
+    if shown:
+        write_color(obj, shown.attribute, *shown.color(flattening))
     found = flattening.distortion
     with outputs() as written:
         export_mesh(obj, written.path(options.output))
@@ -346,7 +348,7 @@ def _flatten(options: argparse.Namespace) -> int:
             _write_report(written.path(options.report), figures)
     for note in notes:
         say_error(f"mobius: warning: {note}")
-    _warn_of_losses(options.output, ["uv", "colors"] if measure else ["uv"])
+    _warn_of_losses(options.output, ["uv", "colors"] if shown else ["uv"])
     say(
         f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
         f"(median {found.median_angle_error:.2f}°, 99 % {found.percentile_99_angle_error:.1f}°, "

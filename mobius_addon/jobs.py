@@ -1,8 +1,11 @@
 """Long work: a worker thread that sees only arrays, and operators that run it blocking or in the background.
 
 The way of Blender's own extension operators: one `execute` serves scripts, which wait, and the window, where the
-operator goes on as a modal one with a timer. ESC asks the worker to stop; results are written once, at the end, by the
-main thread.
+operator goes on as a modal one with a timer. Results are written once, at the end, by the main thread.
+
+ESC ends the operator at once. The thread is told to stop, which it does when the solver next says how far it is: within
+a fraction of a second mostly, up to some seconds in a long factorisation. Nobody waits for it, and nobody takes its
+result.
 """
 
 from __future__ import annotations
@@ -12,12 +15,17 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Cancelled, MeshError, Progress
 from .mesh_data import Refusal
 
 Report = Callable[[Progress], bool | None]
 Work = Callable[[Report], Any]
+
+INTERVAL = 0.1
+"""Seconds between looks at the worker."""
 
 
 class Job:
@@ -27,16 +35,22 @@ class Job:
     ----------
     work : callable
         Called with a progress callback; may touch arrays only, never bpy.
+    title : str
+        What it is, for the status bar.
     """
 
-    def __init__(self, work: Work) -> None:
-        self.progress: Progress | None = None
+    current: ClassVar[Job | None] = None
+    """The one that runs in the window."""
+
+    def __init__(self, work: Work, title: str = "") -> None:
+        self.title = title
+        self.progress = Progress("Starting", 0.0)
         self.result: Any = None
         self.error: BaseException | None = None
         self._work = work
         self._stop = threading.Event()
-        # a daemon, so that quitting Blender never waits for it
-        self._thread = threading.Thread(target=self._run, name="mobius", daemon=True)
+        # no daemon: at exit Python waits until it has noticed that it should stop, rather than pulling the rug
+        self._thread = threading.Thread(target=self._run, name="mobius")
         self._thread.start()
 
     def _run(self) -> None:
@@ -68,7 +82,12 @@ def describe_proof(progress: Progress) -> str:
     """Return what the search has proved so far, or nothing outside the search."""
     if progress.value is None or progress.upper_bound is None:
         return ""
-    return f"matched {progress.value:.1f} of at most {progress.upper_bound:.1f}"
+    return iface_("{:.1f} matched of at most {:.1f}").format(progress.value, progress.upper_bound)
+
+
+def why_busy() -> str | None:
+    """Return why no other long work can begin now, or None if it can."""
+    return rpt_("{} is under way: press ESC to stop it").format(rpt_(Job.current.title)) if Job.current else None
 
 
 class JobOperator:
@@ -96,25 +115,22 @@ class JobOperator:
             work = self.prepare(context)
         except (Refusal, MeshError) as error:
             return self._refused(error)
-        if not bpy.app.background and self.options.is_invoke:
-            self._job = Job(work)
-            manager = context.window_manager
-            manager.mobius_job.start(self.job_title)
-            self._timer = manager.event_timer_add(0.1, window=context.window)
-            manager.modal_handler_add(self)
-            return {"RUNNING_MODAL"}
         manager = context.window_manager
+        if not bpy.app.background and self.options.is_invoke:
+            self._job = Job.current = Job(work, self.job_title)
+            self._shown: tuple[str, int] | None = None
+            self._timer = manager.event_timer_add(INTERVAL, window=context.window)
+            manager.modal_handler_add(self)
+            redraw(context)
+            return {"RUNNING_MODAL"}
         manager.progress_begin(0, 1)
 
         def show(progress: Progress) -> None:
             manager.progress_update(progress.fraction)
 
         try:
-            result = work(show)
-            self.finish(context, result)
-        except Cancelled:
-            return self._stopped()
-        except KeyboardInterrupt:
+            self.finish(context, work(show))
+        except (Cancelled, KeyboardInterrupt):
             return self._stopped()
         except (Refusal, MeshError) as error:
             return self._refused(error)
@@ -126,27 +142,18 @@ class JobOperator:
         """Follow the worker; everything but ESC passes through."""
         if event.type == "ESC" and event.value == "PRESS":
             self._job.cancel()
-            context.window_manager.mobius_job.show("Stopping", "", 0.0)
-            _redraw_sidebars(context)
-            return {"RUNNING_MODAL"}
+        if self._job.cancelled:  # by ESC or the panel's button
+            self._close(context)
+            return self._stopped()
         if event.type != "TIMER":
             return {"RUNNING_MODAL", "PASS_THROUGH"}
         if not self._job.done:
-            if self._job.progress is not None and not self._job.cancelled:
-                progress = self._job.progress
-                proved = describe_proof(progress)
-                if context.window_manager.mobius_job.show(progress.stage, proved, progress.fraction):
-                    now = ": ".join(filter(None, (self.job_title, progress.stage, proved)))
-                    context.workspace.status_text_set(f"{now} (ESC: stop)")
-                    _redraw_sidebars(context)
+            self._show(context, self._job.progress)
             return {"RUNNING_MODAL", "PASS_THROUGH"}
         self._close(context)
-        error = self._job.error
-        if self._job.cancelled or isinstance(error, Cancelled):
-            return self._stopped()
         try:
-            if error is not None:
-                raise error
+            if self._job.error is not None:
+                raise self._job.error
             self.finish(context, self._job.result)
         except (Refusal, MeshError) as refusal:
             return self._refused(refusal)
@@ -157,27 +164,72 @@ class JobOperator:
         self._job.cancel()
         self._close(context)
 
+    def _show(self, context: bpy.types.Context, progress: Progress) -> None:
+        """Say in the status bar and the panel where the work is, if that is news."""
+        now = ": ".join(filter(None, (iface_(self.job_title), iface_(progress.stage), describe_proof(progress))))
+        shown = now, round(100 * progress.fraction)
+        if shown != self._shown:
+            self._shown = shown
+            context.workspace.status_text_set(f"{now}   |   {iface_('ESC: Stop')}")
+            redraw(context)
+
     def _close(self, context: bpy.types.Context) -> None:
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.mobius_job.stop()
+        context.window_manager.event_timer_remove(self._timer)
+        if Job.current is self._job:
+            Job.current = None
         if context.workspace is not None:
             context.workspace.status_text_set(None)
-        _redraw_sidebars(context)
+        redraw(context)
 
     def _refused(self, error: Exception) -> set[str]:
         self.report({"ERROR"}, str(error))
         return {"CANCELLED"}
 
     def _stopped(self) -> set[str]:
-        self.report({"INFO"}, f"{self.job_title} stopped: nothing was changed")
+        self.report({"INFO"}, rpt_("{} stopped: nothing was changed").format(rpt_(self.job_title)))
         return {"CANCELLED"}
 
 
-def _redraw_sidebars(context: bpy.types.Context) -> None:
+def redraw(context: bpy.types.Context, types: tuple[str, ...] = ("VIEW_3D",)) -> None:
+    """Have all editors of these types drawn again."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+            if area.type in types:
+                area.tag_redraw()
+
+
+class MOBIUS_OT_stop(bpy.types.Operator):
+    """Stop the work under way; nothing is changed."""
+
+    bl_idname = "mobius.stop"
+    bl_label = "Stop"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Allow while work is under way."""
+        if Job.current is None:
+            cls.poll_message_set("Nothing is being computed")
+        return Job.current is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Ask the work to stop; its operator notices at once."""
+        assert Job.current is not None
+        Job.current.cancel()
+        return {"FINISHED"}
+
+
+_register, _unregister = bpy.utils.register_classes_factory((MOBIUS_OT_stop,))
+
+
+def register() -> None:
+    """Register the operator."""
+    _register()
+
+
+def unregister() -> None:
+    """Undo `register`, and stop the work under way: Blender quits or the extension is switched off."""
+    if Job.current is not None:
+        Job.current.cancel()
+        Job.current = None
+    _unregister()

@@ -22,7 +22,7 @@ class ScanOptions:
         name="Fill Holes",
         description="Accept a mesh with openings, such as a mouth: all but the outer one are closed for the "
         "computation. The mesh itself stays as it is",
-        default=False,
+        default=True,
     )
     outer_loop: bpy.props.EnumProperty(
         name="Outer Boundary",

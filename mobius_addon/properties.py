@@ -1,9 +1,9 @@
-"""What the extension keeps: choices in the scene, the last alignment on the target's mesh, work under way."""
+"""What the extension keeps: choices in the scene, the last alignment on the target's mesh, what the overlay draws."""
 
 # no postponed annotations here: Blender reads the properties from them
 import bpy
 
-from . import topology_cache
+from . import overlay
 from .options import AlignOptions, ScanOptions, TransferOptions
 from .usable import is_in_scene
 
@@ -45,33 +45,54 @@ class MobiusAlignment(bpy.types.PropertyGroup):
     packed: bpy.props.StringProperty(subtype="BYTE_STRING")
 
 
-class MobiusJob(bpy.types.PropertyGroup):
-    """Work under way in the window, for the panel to draw; not saved."""
+def _show_or_hide(_view: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    overlay.follow(context)
 
-    title: bpy.props.StringProperty()
-    text: bpy.props.StringProperty()
-    proved: bpy.props.StringProperty()
-    fraction: bpy.props.FloatProperty()
-    running: bpy.props.BoolProperty()
 
-    def start(self, title: str) -> None:
-        """Begin to show work."""
-        self.title, self.text, self.proved, self.fraction, self.running = title, "Starting", "", 0.0, True
+class MobiusView(bpy.types.PropertyGroup):
+    """What the overlay draws; of the session, not of the file."""
 
-    def show(self, text: str, proved: str, fraction: float) -> bool:
-        """Show where the work is and what is proved so far, and return whether that is news."""
-        if (text, proved, round(fraction, 2)) == (self.text, self.proved, round(self.fraction, 2)):
-            return False
-        self.text, self.proved, self.fraction = text, proved, fraction
-        return True
-
-    def stop(self) -> None:
-        """Show nothing any more."""
-        self.running = False
+    matches: bpy.props.BoolProperty(
+        name="Matched Points",
+        description="Draw matched points of source and target and lines between them, colored by confidence",
+        default=False,
+        update=_show_or_hide,
+    )
+    count: bpy.props.IntProperty(
+        name="Points",
+        description="How many matched points are drawn, spread evenly over the target",
+        default=200,
+        min=1,
+        soft_max=2000,
+        max=20000,
+        update=_show_or_hide,
+    )
+    lines: bpy.props.FloatProperty(
+        name="Lines",
+        description="How opaque the lines between matched points are; 0: only the points are drawn",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_show_or_hide,
+    )
+    discs: bpy.props.BoolProperty(
+        name="Discs in UV Editors",
+        description="Draw the two discs in the shared layout in every UV editor, also in Object Mode",
+        default=False,
+        update=_show_or_hide,
+    )
+    legend: bpy.props.BoolProperty(
+        name="Legend",
+        description="Say in the viewport what the colors of a heat map mean, while one is the active color attribute "
+        "of the active object",
+        default=False,
+        update=_show_or_hide,
+    )
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(
-    (MobiusSettings, MobiusAlignment, MobiusJob)
+    (MobiusSettings, MobiusAlignment, MobiusView)
 )
 
 
@@ -80,14 +101,12 @@ def register() -> None:
     _register_classes()
     bpy.types.Scene.mobius = bpy.props.PointerProperty(type=MobiusSettings)
     bpy.types.Mesh.mobius_alignment = bpy.props.PointerProperty(type=MobiusAlignment)
-    bpy.types.WindowManager.mobius_job = bpy.props.PointerProperty(type=MobiusJob)
-    topology_cache.register()
+    bpy.types.WindowManager.mobius_view = bpy.props.PointerProperty(type=MobiusView)
 
 
 def unregister() -> None:
     """Undo `register`."""
-    topology_cache.unregister()
-    del bpy.types.WindowManager.mobius_job
+    del bpy.types.WindowManager.mobius_view
     del bpy.types.Mesh.mobius_alignment
     del bpy.types.Scene.mobius
     _unregister_classes()

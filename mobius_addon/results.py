@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..solver.mesh import Booleans, Complexes, Floats
-from .attributes import MAX_UV_MAPS, AttributeAccess, VertexGroupAccess
-from .mesh_data import Refusal, Surface
-
-DISTORTION_COLOR = "Mobius Distortion"
+from .attributes import MAX_UV_MAPS, SHARED_LAYOUT, AttributeAccess, VertexGroupAccess
+from .mesh_data import Refusal, Surface, foreach
 
 _LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
 _COLOR = AttributeAccess("FLOAT_COLOR", "POINT", "color", 4)
@@ -56,6 +55,48 @@ def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Sur
     layers.active = layers[name]
     if render is not None:  # what is rendered stays as it was
         layers[render].active_render = True
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A mesh in the shared layout, as `write_layout` wrote it.
+
+    Attributes
+    ----------
+    disc : (n,) complex128
+        Each vertex's place; nan where it has none.
+    edges : (e, 2) int32
+        The mesh's edges between vertices that have a place.
+    """
+
+    disc: Complexes
+    edges: np.ndarray
+
+
+def read_layout(obj: bpy.types.Object) -> Layout | None:
+    """Return a mesh, not in Edit Mode, in the shared layout; None if it has none."""
+    mesh = obj.data
+    layer = mesh.uv_layers.get(SHARED_LAYOUT)
+    if layer is None or not len(layer.uv):
+        return None
+    places = np.full((len(mesh.vertices), 2), np.nan)
+    places[foreach(mesh.loops, "vertex_index", 1, np.int32)] = foreach(layer.uv, "vector", 2, np.float32)
+    places[(places == 0).all(axis=1)] = np.nan
+    disc = 2 * (places[:, 0] + 1j * places[:, 1]) - (1 + 1j)
+    edges = foreach(mesh.edges, "vertices", 2, np.int32)
+    return Layout(disc, edges[np.isfinite(disc)[edges].all(axis=1)])
+
+
+def pattern_color(disc: Complexes, checks: int = 12) -> Floats:
+    """Return linear colors, (n, 4), of a chequered pattern on the unit disc at points, (n,), `checks` across.
+
+    The hues are those of `disc_color`, so that no two checks look alike; their edges are soft, as colors at vertices are.
+    """
+    across, up = (np.sin(np.pi * checks / 2 * x) for x in (disc.real, disc.imag))
+    light = np.clip(0.5 + 2 * across * up, 0, 1)
+    color = disc_color(disc)
+    color[:, :3] *= (0.25 + 0.75 * light)[:, None]
+    return color
 
 
 def disc_color(disc: Complexes) -> Floats:

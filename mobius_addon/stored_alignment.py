@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from functools import lru_cache
 from typing import Any
 
 import bpy
@@ -47,10 +48,10 @@ def store(
     kept.upper_bound = alignment.search.upper_bound
     kept.certified = alignment.search.certified
     kept.reflected = alignment.mobius.reflected
-    figures = report(alignment, correspondence)
-    kept.coverage = figures["coverage"]
+    about = report(alignment, correspondence)
+    kept.coverage = about["coverage"]
     kept.seconds = sum(alignment.seconds.values())
-    kept.report = json.dumps(figures)
+    kept.report = json.dumps(about)
     kept.packed = packed.getvalue()
 
 
@@ -63,6 +64,19 @@ def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
 def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
     """Return the sentence for a pair without an alignment."""
     return f"'{target.name}' has not been aligned with '{source.name}' yet: press Align first"
+
+
+def figures(target: bpy.types.Object) -> dict[str, Any] | None:
+    """Return the report of the alignment that the target's mesh keeps, None if it cannot be read; see `solver.report`."""
+    return _parsed(target.data.mobius_alignment.report)
+
+
+@lru_cache(maxsize=8)
+def _parsed(report: str) -> dict[str, Any] | None:
+    try:
+        return json.loads(report)
+    except ValueError:
+        return None
 
 
 def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Surface, Surface]) -> Correspondence:

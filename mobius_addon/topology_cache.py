@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
-from ..solver import MeshError, TriangleMesh, topology
-from ..solver.mesh import plural
+from ..solver import MeshError, Topology, TriangleMesh, topology
+from . import edits
 from .computation import Repair, in_order
 from .mesh_data import read_surface
 
@@ -24,15 +25,18 @@ class Line:
     rows : tuple of str
         Short texts, for one row each: what it is, or what is in the way and then what to do about it.
     is_disc : bool or None
-        None if it is not known yet.
+        Whether it can be used, openings that will be filled included; None if that is not known yet.
+    selectable : bool
+        Whether there is something to select: what is in the way, or the loops that will be filled.
     """
 
     rows: tuple[str, ...]
     is_disc: bool | None
+    selectable: bool = False
 
 
 # a cache, never the truth: it can be emptied at any time
-_lines: dict[tuple[int, ...], Line] = {}
+_lines: dict[tuple[int | str, ...], Line] = {}
 
 
 def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
@@ -40,7 +44,8 @@ def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
     key = _key(obj, repair)
     if key not in _lines:
         if len(obj.data.polygons) > MAX_POLYGONS:
-            return Line((f"{len(obj.data.vertices):,} vertices, not checked yet",), None)
+            count = iface_("{:,} vertices").format(len(obj.data.vertices))
+            return Line((count, iface_("not checked yet")), None, True)
         try:
             store(obj, read_surface(obj).mesh, repair)
         except MeshError as error:
@@ -55,14 +60,35 @@ def store(obj: bpy.types.Object, mesh: TriangleMesh, repair: Repair) -> None:
 
 def _line(mesh: TriangleMesh, repair: Repair) -> Line:
     try:
-        found = topology(in_order(mesh, repair).mesh)
+        mesh = in_order(mesh, repair).mesh
     except MeshError as error:
-        return Line(_rows(str(error).removeprefix(f"'{mesh.name}' ")), False)
-    if problems := found.problems(fill_holes=repair.fill_holes):
-        return Line(tuple(row for problem in problems for row in _rows(problem)), False)
-    openings = len(found.boundary_loops) - 1
-    what = f"disc with {plural(openings, 'opening')}" if openings else "disc"
-    return Line((f"{what}, {found.vertices:,} vertices",), True)
+        refused = _rows(str(error).removeprefix(f"'{mesh.name}' "))
+    else:
+        refused = None
+    found = topology(mesh)
+    if problem := _problem(found, repair):
+        return Line(problem, False, True)
+    if refused:  # such as a band with one side only
+        return Line(refused, False)
+    if openings := len(found.boundary_loops) - 1:
+        loops = iface_("{:,} boundary loops:").format(openings + 1)
+        return Line((loops, iface_("{:,} will be filled").format(openings)), True, True)
+    return Line((iface_("disc, {:,} vertices").format(found.vertices),), True)
+
+
+def _problem(found: Topology, repair: Repair) -> tuple[str, str] | None:
+    """Return the first thing that is in the way, and what to do about it."""
+    for count, what, remedy in (
+        (len(found.non_manifold_edges), "{:,} edges with over 2 faces:", "delete the extra faces"),
+        (len(found.non_manifold_vertices), "{:,} points where parts touch:", "split them"),
+        (found.parts if found.parts > 1 else 0, "{:,} separate parts:", "keep one, or turn on Largest Part"),
+        (int(not found.boundary_loops), "closed surface:", "cut it first"),
+        (0 if repair.fill_holes else len(found.boundary_loops[1:]), "{:,} openings:", "turn on Fill Holes"),
+        (found.handles, "{:,} handles, as of a cup:", "cut through them and fill"),
+    ):
+        if count:
+            return iface_(what).format(count), iface_(remedy)
+    return None
 
 
 def _rows(problem: str) -> tuple[str, ...]:
@@ -70,39 +96,25 @@ def _rows(problem: str) -> tuple[str, ...]:
     return tuple(problem.split(": ", 1))
 
 
-def _key(obj: bpy.types.Object, repair: Repair) -> tuple[int, ...]:
+def _key(obj: bpy.types.Object, repair: Repair) -> tuple[int | str, ...]:
     mesh = obj.data
     counts = len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons)
-    return mesh.session_uid, *counts, repair.fill_holes, repair.largest_part
+    # the texts are in the language of the interface
+    language = bpy.app.translations.locale
+    return mesh.session_uid, *counts, repair.fill_holes, repair.largest_part, language
 
 
-@bpy.app.handlers.persistent
-def _forget_edited(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not _lines:
-        return
-    for update in depsgraph.updates:
-        if update.is_updated_geometry:
-            data = getattr(update.id.original, "data", update.id.original)
-            uid = getattr(data, "session_uid", None)
-            for key in [key for key in _lines if key[0] == uid]:
-                del _lines[key]
-
-
-@bpy.app.handlers.persistent
-def _forget_all(*_: object) -> None:
-    _lines.clear()
+def _forget(edited: int | None) -> None:
+    for key in [key for key in _lines if edited is None or key[0] == edited]:
+        del _lines[key]
 
 
 def register() -> None:
     """Watch for edits."""
-    bpy.app.handlers.depsgraph_update_post.append(_forget_edited)
-    for handlers in (bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
-        handlers.append(_forget_all)
+    edits.listen(_forget)
 
 
 def unregister() -> None:
     """Stop watching."""
-    bpy.app.handlers.depsgraph_update_post.remove(_forget_edited)
-    for handlers in (bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
-        handlers.remove(_forget_all)
+    edits.ignore(_forget)
     _lines.clear()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+from . import stored_alignment
+
 
 def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, writes: bool = True) -> str | None:
     """Return why an object cannot be used, or None if it can.
@@ -38,12 +40,17 @@ def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     return scene.objects.get(obj.name) == obj or any(other == obj for other in scene.objects)
 
 
-def why_not_pair(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes_source: bool) -> str | None:
+def why_not_pair(
+    settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes_source: bool, writes_target: bool = True
+) -> str | None:
     """Return why the chosen source and target cannot be used together, or None if they can."""
     source, target = settings.source, settings.target
-    reason = why_not(source, "source mesh", scene, writes=writes_source) or why_not(target, "target mesh", scene)
-    if reason is not None:
-        return reason
+    reason = why_not(source, "source mesh", scene, writes=writes_source)
+    return reason or why_not(target, "target mesh", scene, writes=writes_target) or why_not_two(source, target)
+
+
+def why_not_two(source: bpy.types.Object, target: bpy.types.Object) -> str | None:
+    """Return why two meshes are not two, or None if they are."""
     if source == target:
         return f"'{source.name}' is both source and target: choose two objects"
     if source.data == target.data:
@@ -52,3 +59,14 @@ def why_not_pair(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, w
             "(Object > Relations > Make Single User > Object & Data)"
         )
     return None
+
+
+def why_not_aligned(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes: bool = True) -> str | None:
+    """Return why the alignment of the chosen source and target cannot be used, or None if it can.
+
+    `writes` tells whether the target will be changed.
+    """
+    reason = why_not_pair(settings, scene, writes_source=False, writes_target=writes)
+    if reason is None and not stored_alignment.exists(settings.target, settings.source):
+        reason = stored_alignment.missing(settings.target, settings.source)
+    return reason

@@ -70,26 +70,44 @@ def vertex_angle_errors(mesh: TriangleMesh, plane: Complexes) -> Floats:
     return np.divide(total, corners, out=np.full(n, np.nan), where=corners > 0)
 
 
-def dilatations(mesh: TriangleMesh, plane: Complexes) -> Floats:
+def dilatations(mesh: TriangleMesh, image: Complexes | Floats) -> Floats:
     """Return the quasi-conformal dilatation of each triangle, (m,), the larger over the smaller stretch, >= 1.
 
     Infinite where a triangle is turned over or collapsed, nan where it has no area on the surface.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    image : (n,) complex128 or (n, 3) float64
+        Where the vertices go: in the plane, or in space, where no triangle counts as turned over.
     """
-    corners = plane[mesh.faces]
-    squares = np.abs(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]) ** 2
-    # the integral of |grad f|^2 over a triangle: half the cotangents times the squared sides in the plane
+    corners = image[mesh.faces]
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    squares = (sides**2).sum(axis=2) if image.ndim == 2 else np.abs(sides) ** 2
+    # the integral of |grad f|^2 over a triangle: half the cotangents times the squared sides of its image
     energy = 0.5 * (cotangents(mesh.edge_lengths) * squares).sum(axis=1)
-    area = signed_areas(plane, mesh.faces)
+    area = _areas(image, mesh.faces)
     ratio: Floats = np.divide(energy, 2 * area, out=np.full(len(area), np.inf), where=area > 0)
     np.maximum(ratio, 1, out=ratio)
     ratio[mesh.face_areas <= 1e-12 * mesh.edge_lengths.max(axis=1) ** 2] = np.nan
     return ratio + np.sqrt((ratio - 1.0) * (ratio + 1.0))
 
 
-def log_conformal_factor(mesh: TriangleMesh, plane: Complexes) -> Floats:
-    """Return half the log of area in the plane over area on the surface around each vertex, (n,); nan where unused."""
-    flat = np.abs(signed_areas(plane, mesh.faces))
-    around = np.bincount(mesh.faces.ravel(), np.repeat(flat / 3, 3), minlength=len(mesh.vertices))
+def _areas(image: Complexes | Floats, faces: Integers) -> Floats:
+    """Return the area of each triangle, (m,): signed in the plane, not in space."""
+    if image.ndim == 1:
+        return signed_areas(image, faces)
+    a, b, c = (image[faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def log_conformal_factor(mesh: TriangleMesh, image: Complexes | Floats) -> Floats:
+    """Return half the log of the image's area over the area around each vertex, (n,); nan where unused.
+
+    The image, (n,) complex or (n, 3), lies in the plane or in space.
+    """
+    covered = np.abs(_areas(image, mesh.faces))
+    around = np.bincount(mesh.faces.ravel(), np.repeat(covered / 3, 3), minlength=len(mesh.vertices))
     tiny = np.finfo(float).tiny
     factor = 0.5 * np.log(np.maximum(around, tiny) / np.maximum(mesh.vertex_areas, tiny))
     factor[np.bincount(mesh.faces.ravel(), minlength=len(factor)) == 0] = np.nan

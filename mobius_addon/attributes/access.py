@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...solver.mesh import Booleans
+from ..heat_maps import DISC_MEASURES, MAP_MEASURES
 from ..mesh_data import Refusal, foreach
 from .carrier import Values
 
@@ -18,8 +19,12 @@ DISC_LAYOUT = "Mobius Disc"
 SHARED_LAYOUT = "Mobius"
 SHARED_COLOR = "Mobius Color"
 MATCHED_GROUP = "Mobius Matched"
-OWN_NAMES = frozenset({DISC_LAYOUT, SHARED_LAYOUT, SHARED_COLOR, MATCHED_GROUP})
-"""Names of what flatten and align write themselves; they are no content to carry."""
+PATTERN_COLOR = "Mobius Pattern"
+OWN_NAMES = frozenset(
+    {DISC_LAYOUT, SHARED_LAYOUT, SHARED_COLOR, MATCHED_GROUP, PATTERN_COLOR}
+    | {measure.attribute for measure in (*DISC_MEASURES, *MAP_MEASURES)}
+)
+"""Names of what our own operators write to be looked at; they are no content to carry."""
 
 MAX_UV_MAPS = 8
 

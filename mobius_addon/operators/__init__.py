@@ -1,15 +1,38 @@
-"""The verbs: one module per operator."""
+"""The verbs: one module per subject."""
 
 import bpy
 
-from . import align, check, flatten, select_unmatched, transfer
+from . import align, check, discs, flatten, heat_map, select_unmatched, side_by_side, swap, transfer
 
-register, unregister = bpy.utils.register_classes_factory(
+_register, _unregister = bpy.utils.register_classes_factory(
     (
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
+        swap.MOBIUS_OT_swap,
         align.MOBIUS_OT_align,
         transfer.MOBIUS_OT_transfer,
         select_unmatched.MOBIUS_OT_select_unmatched,
+        heat_map.MOBIUS_OT_heat_map,
+        discs.MOBIUS_OT_show_discs,
+        side_by_side.MOBIUS_OT_side_by_side,
+        side_by_side.MOBIUS_OT_end_side_by_side,
     )
 )
+
+
+@bpy.app.handlers.persistent
+def _forget(*_: object) -> None:
+    align.forget_last()
+
+
+def register() -> None:
+    """Register the operators."""
+    _register()
+    bpy.app.handlers.load_post.append(_forget)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    bpy.app.handlers.load_post.remove(_forget)
+    align.forget_last()
+    _unregister()

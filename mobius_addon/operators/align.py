@@ -1,10 +1,12 @@
 """Find the certified correspondence between two meshes and show it on both."""
 
 # no postponed annotations here: Blender reads the properties from them
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.spatial import KDTree
 
 from ... import solver
@@ -12,20 +14,24 @@ from ...solver.mesh import Floats
 from .. import results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT
 from ..computation import aligned
-from ..jobs import JobOperator, Report, Work
-from ..mesh_data import Refusal, read_surface, scale_warning
+from ..jobs import JobOperator, Report, Work, why_busy
+from ..mesh_data import Refusal, Surface, read_surface, scale_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..usable import why_not_pair
 
 
-class MOBIUS_OT_align(JobOperator, AlignOptions, ScanOptions, bpy.types.Operator):
-    """Match source and target: both get a shared UV map, corresponding colors and a group of matched points."""
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """An alignment that was computed, with what it was computed from."""
 
-    bl_idname = "mobius.align"
-    bl_label = "Align"
-    bl_options = {"REGISTER", "UNDO"}
-    job_title = "Align"
+    surfaces: tuple[Surface, Surface]
+    alignment: solver.Alignment
+    correspondence: solver.Correspondence
+
+
+class AlignOperator(JobOperator, AlignOptions, ScanOptions):
+    """Mixin for operators that align a source and a target; the last result is kept in case the same is asked again."""
 
     time_limit: bpy.props.FloatProperty(
         name="Time Limit",
@@ -34,13 +40,89 @@ class MOBIUS_OT_align(JobOperator, AlignOptions, ScanOptions, bpy.types.Operator
         min=0.0,
         options={"SKIP_SAVE"},
     )
+    take_rival: bpy.props.BoolProperty(
+        name="Take the Rival",
+        description="Continue with the second best map, which sends everything elsewhere, in place of the best: for "
+        "surfaces with a symmetry, where the best may be the wrong one",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    properties: Any
+
+    def begin(self, context: bpy.types.Context, source: bpy.types.Object, target: bpy.types.Object) -> Work:
+        """Read both meshes, and return the work that gives their `Aligned`."""
+        self._names = source.name, target.name
+        surfaces = read_surface(source), read_surface(target)
+        limit = self.time_limit
+        if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
+            limit = kept.time_limit
+        meshes = surfaces[0].mesh, surfaces[1].mesh
+        outer = outer_vertex(source, meshes[0], self), outer_vertex(target, meshes[1], self)
+        options = replace(align_settings(self, limit, outer), take_rival=self.take_rival)
+        largest_part = self.largest_part
+        asked = surfaces[0].fingerprint(), surfaces[1].fingerprint(), options, largest_part
+
+        def work(report: Report) -> Aligned:
+            if _last.get("asked") != asked:
+                found = aligned(*meshes, options, largest_part=largest_part, progress=report)
+                _last.update(asked=asked, found=found)
+            return Aligned(surfaces, *_last["found"])
+
+        return work
+
+    def objects(self, surfaces: tuple[Surface, Surface]) -> tuple[bpy.types.Object, bpy.types.Object]:
+        """Return source and target, if they are still what was read.
+
+        Raises
+        ------
+        Refusal
+            They are not.
+        """
+        found = []
+        for name, surface in zip(self._names, surfaces, strict=True):
+            obj = bpy.data.objects.get(name)
+            if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
+                raise Refusal(
+                    rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name)
+                )
+            if read_surface(obj).fingerprint() != surface.fingerprint():
+                raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
+            results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
+            found.append(obj)
+        return found[0], found[1]
+
+    def keep(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
+        """Write an alignment on both meshes and report it."""
+        write_alignment(source, target, done.alignment, done.correspondence, done.surfaces)
+        stored_alignment.store(target, source, done.alignment, done.correspondence, done.surfaces)
+        for warning in [scale_warning(source), scale_warning(target), *done.alignment.warnings]:
+            if warning:
+                self.report({"WARNING"}, warning)
+        self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))
+
+
+# a cache, never the truth: it can be emptied at any time
+_last: dict[str, Any] = {}
+
+
+def forget_last() -> None:
+    """Free the memory of the last result."""
+    _last.clear()
+
+
+class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
+    """Match source and target: both get a shared UV map, corresponding colors and a group of matched points."""
+
+    bl_idname = "mobius.align"
+    bl_label = "Align"
+    # no REGISTER: turning knobs in the redo panel would search for seconds each time, with a frozen window
+    bl_options = {"UNDO"}
+    job_title = "Align"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that can be written."""
-        reason = why_not_pair(context.scene.mobius, context.scene, writes_source=True)
-        if context.window_manager.mobius_job.running:
-            reason = "An alignment is running: press ESC to stop it"
+        reason = why_not_pair(context.scene.mobius, context.scene, writes_source=True) or why_busy()
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -48,39 +130,13 @@ class MOBIUS_OT_align(JobOperator, AlignOptions, ScanOptions, bpy.types.Operator
     def prepare(self, context: bpy.types.Context) -> Work:
         """Read both meshes."""
         settings = context.scene.mobius
-        self._names = settings.source.name, settings.target.name
-        self._surfaces = read_surface(settings.source), read_surface(settings.target)
         for obj in (settings.source, settings.target):
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
-        limit = self.time_limit
-        if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
-            limit = kept.time_limit
-        source, target = (surface.mesh for surface in self._surfaces)
-        outer = outer_vertex(settings.source, source, self), outer_vertex(settings.target, target, self)
-        options, largest_part = align_settings(self, limit, outer), self.largest_part
+        return self.begin(context, settings.source, settings.target)
 
-        def work(report: Report) -> tuple[solver.Alignment, solver.Correspondence]:
-            return aligned(source, target, options, largest_part=largest_part, progress=report)
-
-        return work
-
-    def finish(self, context: bpy.types.Context, result: Any) -> None:
+    def finish(self, context: bpy.types.Context, result: Aligned) -> None:
         """Write on both meshes, if they are still what was read."""
-        alignment, correspondence = result
-        objects = [bpy.data.objects.get(name) for name in self._names]
-        for obj, name, surface in zip(objects, self._names, self._surfaces, strict=True):
-            if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
-                raise Refusal(f"'{name}' was removed or is being edited since the alignment began: align again")
-            if read_surface(obj).fingerprint() != surface.fingerprint():
-                raise Refusal(f"'{name}' was edited during the alignment: align again")
-            results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
-        source, target = objects
-        write_alignment(source, target, alignment, correspondence, self._surfaces)
-        stored_alignment.store(target, source, alignment, correspondence, self._surfaces)
-        for warning in [scale_warning(source), scale_warning(target), *alignment.warnings]:
-            if warning:
-                self.report({"WARNING"}, warning)
-        self.report({"INFO"}, summary(source.name, target.name, alignment, correspondence))
+        self.keep(*self.objects(result.surfaces), result)
 
 
 def write_alignment(

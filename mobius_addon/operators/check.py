@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...solver import MeshError, Topology, TriangleMesh, topology
 from ...solver.mesh import Booleans
-from .. import topology_cache
+from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
 from ..options import repair
 from ..usable import why_not
@@ -27,6 +27,12 @@ class MOBIUS_OT_check(bpy.types.Operator):
     )
     select: bpy.props.BoolProperty(
         name="Select Trouble", description="Select the vertices that are in the way, for Edit Mode", default=True
+    )
+    edit: bpy.props.BoolProperty(
+        name="Edit",
+        description="Go to Edit Mode where something is selected, and look at it",
+        default=False,
+        options={"SKIP_SAVE"},
     )
 
     @classmethod
@@ -61,6 +67,10 @@ class MOBIUS_OT_check(bpy.types.Operator):
         if self.select and trouble.any() and obj.data.is_editable:
             select_vertices(obj.data, trouble)
             context.tool_settings.mesh_select_mode = (True, False, False)
+            if self.edit:
+                context.view_layer.objects.active = obj
+                bpy.ops.object.mode_set(mode="EDIT")
+                viewport.look_at_selected(context)
             line += f" ({int(trouble.sum()):,} vertices are selected: see them in Edit Mode)"
         self.report({"WARNING"}, line)
         return {"FINISHED"}

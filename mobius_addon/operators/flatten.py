@@ -7,10 +7,10 @@ import numpy as np
 from ...solver import MeshError
 from ..attributes import DISC_LAYOUT
 from ..computation import flattened
-from ..distortion_color import MEASURES
+from ..heat_maps import DISC_MEASURES, measure
 from ..mesh_data import Refusal, read_surface
 from ..options import ScanOptions, outer_vertex, repair
-from ..results import DISTORTION_COLOR, require_room, write_color, write_layout
+from ..results import require_room, write_color, write_layout
 from ..usable import why_not
 
 
@@ -32,10 +32,10 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
     )
     distortion: bpy.props.EnumProperty(
         name="Distortion",
-        description=f"What the color attribute '{DISTORTION_COLOR}' shows of the map",
+        description="Write how far the map is from an isometry as a color attribute",
         items=(
             ("none", "None", "Write no colors"),
-            *((measure.identifier, measure.label, measure.description) for measure in MEASURES),
+            *((x.identifier, x.label, x.description) for x in DISC_MEASURES),
         ),
         default="none",
     )
@@ -51,9 +51,9 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write the UV map and the colors."""
         obj = context.object
-        measure = next((x for x in MEASURES if x.identifier == self.distortion), None)
+        shown = None if self.distortion == "none" else measure(self.distortion, DISC_MEASURES)
         try:
-            require_room(obj, [DISC_LAYOUT], [DISTORTION_COLOR] if measure else [])
+            require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])
             surface = read_surface(obj)
             outer = outer_vertex(obj, surface.mesh, self)
             flattening, notes = flattened(surface.mesh, self.method, repair(self), outer=outer)
@@ -61,13 +61,13 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
-        if measure:
-            write_color(obj, DISTORTION_COLOR, *measure.color(flattening))
+        if shown:
+            write_color(obj, shown.attribute, *shown.color(flattening))
         for note in notes:
             self.report({"WARNING"}, note)
         found = flattening.distortion
         flips = f", {found.flips} triangles turned over" if found.flips else ""
-        colors = f"; its colors are in '{DISTORTION_COLOR}'" if measure else ""
+        colors = f"; its colors are in '{shown.attribute}'" if shown else ""
         self.report(
             {"INFO"},
             f"'{obj.name}' is flat in the UV map '{DISC_LAYOUT}': "

@@ -67,7 +67,7 @@ def test_operator_options_are_the_solvers_settings() -> None:
     from mobius_extension.solver import AlignSettings
 
     settings: Any = bpy.context.scene.mobius
-    expected = AlignSettings()
+    expected = AlignSettings(fill_holes=True)  # the panel says what will be filled before anything is
     for name, value in vars(align_settings(settings, expected.time_limit or 0)).items():
         wanted = getattr(expected, name)
         assert value == (pytest.approx(wanted) if isinstance(wanted, float) else wanted)  # Blender's floats are short

@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 from mobius_extension.mobius_addon import files, topology_cache  # noqa: E402
 from mobius_extension.mobius_addon.command_line import main  # noqa: E402
 from mobius_extension.mobius_addon.computation import Repair, aligned, in_order  # noqa: E402
-from mobius_extension.mobius_addon.distortion_color import MEASURES, vertex_dilatations  # noqa: E402
+from mobius_extension.mobius_addon.heat_maps import DISC_MEASURES, Measure, vertex_dilatations  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 from mobius_extension.solver import AlignSettings, Flattening, MeshError, TriangleMesh  # noqa: E402
 
@@ -63,7 +63,7 @@ def reported(capfd: pytest.CaptureFixture[str], operator: Callable[..., Any], **
 def test_flatten_closes_openings_on_request_and_not_in_the_mesh() -> None:
     obj = holed()
     with pytest.raises(RuntimeError, match=r"'Holed' has 3 boundary loops \(44, 10 and 4 edges\)"):
-        bpy.ops.mobius.flatten()
+        bpy.ops.mobius.flatten(fill_holes=False)
     before = shape(obj)
     assert bpy.ops.mobius.flatten(fill_holes=True) == {"FINISHED"}
     assert shape(obj) == before
@@ -123,7 +123,7 @@ def test_align_and_transfer_with_openings(pair: tuple[Any, Any]) -> None:
     target = holed("Holed", 21)
     bpy.context.scene.mobius.target = target
     with pytest.raises(RuntimeError, match="'Holed' has 3 boundary loops"):
-        bpy.ops.mobius.align(**QUICK)
+        bpy.ops.mobius.align(**QUICK, fill_holes=False)
     before = shape(source), shape(target)
     settings = QUICK | {"samples": 40, "targets": 300, "refine": "mobius"}
     assert bpy.ops.mobius.align(**settings, fill_holes=True) == {"FINISHED"}
@@ -139,7 +139,7 @@ def test_align_and_transfer_with_openings(pair: tuple[Any, Any]) -> None:
 def test_the_panel_says_whether_the_mesh_can_be_used_with_what_is_switched_on() -> None:
     obj = holed()
     assert topology_cache.line_of(obj, Repair()).is_disc is False
-    assert topology_cache.line_of(obj, Repair(fill_holes=True)).rows == ("disc with 2 openings, 142 vertices",)
+    assert topology_cache.line_of(obj, Repair(fill_holes=True)).rows == ("3 boundary loops:", "2 will be filled")
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert topology_cache.line_of(parts, Repair(fill_holes=True)).is_disc is False
     assert topology_cache.line_of(parts, Repair(largest_part=True)).rows == ("disc, 28 vertices",)
@@ -159,7 +159,7 @@ def test_the_largest_part_is_kept_on_request() -> None:
     uv = corner_values(obj, "Mobius Disc")
     assert (uv[small] == 0).all()
     assert np.abs(disc_of(obj)[~small]).max() == pytest.approx(1, abs=1e-6)
-    colors = np.array([value.color[:] for value in obj.data.color_attributes["Mobius Distortion"].data])
+    colors = np.array([value.color[:] for value in obj.data.color_attributes["Mobius Disc Angles"].data])
     assert np.isfinite(colors).all()
     assert colors[0] == pytest.approx([0.05, 0.05, 0.05, 1])
 
@@ -304,8 +304,9 @@ def square(stretch: complex = 1) -> Flattening:
 
 
 def test_colors_measure_the_distortion() -> None:
-    angles, sizes = MEASURES
-    assert vertex_dilatations(square(3 + 1j))[:4] == pytest.approx(3)
+    angles, sizes = DISC_MEASURES
+    wide = square(3 + 1j)
+    assert vertex_dilatations(wide.mesh, wide.disc)[:4] == pytest.approx(3)
     for stretch, stop in ((1 + 1j, 0), (np.sqrt(2) + 1j, 2), (2 + 1j, 4), (1 + 5j, 4), (1 - 1j, 4)):
         linear, known = angles.color(square(complex(stretch)))
         assert known.tolist() == [True] * 4 + [False]
@@ -318,25 +319,25 @@ def test_colors_measure_the_distortion() -> None:
         assert srgb[:4, :3] == pytest.approx(np.tile(sizes.stops[stop], (4, 1)), abs=1e-6)
 
 
-@pytest.mark.parametrize("measure", [measure.identifier for measure in MEASURES])
-def test_flatten_writes_its_distortion_on_request(measure: str, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("measure", DISC_MEASURES, ids=lambda measure: measure.identifier)
+def test_flatten_writes_its_distortion_on_request(measure: Measure, capfd: pytest.CaptureFixture[str]) -> None:
     obj = make_sheet("Sheet", 10)
     assert bpy.ops.mobius.flatten() == {"FINISHED"}
-    assert "Mobius Distortion" not in obj.data.color_attributes
-    said = reported(capfd, bpy.ops.mobius.flatten, distortion=measure)
-    color = obj.data.color_attributes["Mobius Distortion"]
+    assert obj.data.color_attributes.keys() == []
+    said = reported(capfd, bpy.ops.mobius.flatten, distortion=measure.identifier)
+    color = obj.data.color_attributes[measure.attribute]
     assert (color.data_type, color.domain) == ("FLOAT_COLOR", "POINT")
-    assert obj.data.attributes.active_color_name == "Mobius Distortion"
+    assert obj.data.attributes.active_color_name == measure.attribute
     assert np.ptp([value.color[:3] for value in color.data], axis=0).max() > 0.1
-    for words in ("angles are off by", "dilatation", "lengths times", "'Mobius Distortion'"):
+    for words in ("angles are off by", "dilatation", "lengths times", f"'{measure.attribute}'"):
         assert words in said
 
 
 def test_the_colors_need_their_name() -> None:
     obj = make_sheet("Sheet", 5)
-    obj.vertex_groups.new(name="Mobius Distortion")
+    obj.vertex_groups.new(name="Mobius Disc Sizes")
     before = everything(obj)
-    with pytest.raises(RuntimeError, match="'Sheet' has something named 'Mobius Distortion' that is no color"):
+    with pytest.raises(RuntimeError, match="'Sheet' has something named 'Mobius Disc Sizes' that is no color"):
         bpy.ops.mobius.flatten(distortion="factor")
     assert everything(obj) == before
 
@@ -394,7 +395,7 @@ def test_flatten_command(scans: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert (found["method"], found["holes"], found["distortion"]["flips"]) == ("mid-edge", [10, 4], 0)
     obj = files.import_mesh("flat.blend").obj
     assert len(obj.data.polygons) == 400 - 7
-    assert obj.data.color_attributes.keys() == ["Mobius Distortion"]
+    assert obj.data.color_attributes.keys() == ["Mobius Disc Angles"]
     status, _, err = run(capsys, "flatten", "sheet.obj", "-o", "flat.stl", "--distortion", "factor")
     assert status == 0
     assert ".stl files cannot hold UV maps, color attributes: write a .blend to keep them" in err

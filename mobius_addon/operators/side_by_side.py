@@ -1,0 +1,158 @@
+"""Source and target beside each other, in one pose, with one pattern carried by the alignment."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+from mathutils import Matrix
+
+from ...solver import MeshError
+from ...solver.mesh import Floats
+from .. import stored_alignment, viewport
+from ..attributes import PATTERN_COLOR
+from ..mesh_data import Refusal, foreach, read_surface
+from ..results import pattern_color, read_layout, require_room, write_color
+from ..usable import why_not, why_not_aligned
+
+COLLECTION = "Mobius Side by Side"
+
+GAP = 0.15
+"""Between the two, as a share of the wider one's width."""
+
+
+class MOBIUS_OT_side_by_side(bpy.types.Operator):
+    """Show copies of source and target beside each other, in one pose, with a pattern carried by the alignment."""
+
+    bl_idname = "mobius.side_by_side"
+    bl_label = "Side by Side"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Allow for two meshes in Object Mode that have been aligned."""
+        settings, scene = context.scene.mobius, context.scene
+        reason = why_not(settings.source, "source mesh", scene) or why_not_aligned(settings, scene)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Paint both meshes and put copies beside each other."""
+        source, target = context.scene.mobius.source, context.scene.mobius.target
+        try:
+            surfaces = read_surface(source), read_surface(target)
+            found = stored_alignment.load(target, source, surfaces)
+            layouts = read_layout(source), read_layout(target)
+            if layouts[0] is None or layouts[1] is None:
+                raise Refusal(rpt_("The shared layout was removed: press Align again"))
+            for obj in (source, target):
+                require_room(obj, [], [PATTERN_COLOR])
+        except (Refusal, MeshError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for obj, layout in ((source, layouts[0]), (target, layouts[1])):
+            known = np.isfinite(layout.disc)
+            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, layout.disc, 0)), known)
+        places = [_world(obj) for obj in (source, target)]
+        some = found.matched if found.matched.any() else found.face >= 0
+        pose = similarity(places[1][some], (found.matrix() @ places[0])[some])
+        right = viewport.axes_of(viewport.space_of(context))[0]
+        posed = places[1] @ pose[:3, :3].T + pose[:3, 3]
+        step = _beside(places[0] @ right, posed @ right)
+        end(context)
+        copies = [
+            _copy(context, source, source.matrix_world),
+            _copy(context, target, Matrix.Translation(right * step) @ Matrix(pose.tolist()) @ target.matrix_world),
+        ]
+        context.view_layer.update()  # what is new can be selected from then on
+        for obj in context.view_layer.objects:
+            obj.select_set(obj in copies)
+        context.view_layer.objects.active = copies[1]
+        viewport.show_colors(context)
+        viewport.look_at_selected_alone(context)
+        return {"FINISHED"}
+
+
+class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
+    """Remove the copies that Side by Side made and return to the whole scene."""
+
+    bl_idname = "mobius.end_side_by_side"
+    bl_label = "End Side by Side"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Allow where the copies are."""
+        if not is_shown(context):
+            cls.poll_message_set("Nothing is shown side by side")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Switch to Object Mode first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove the copies and make the target active again."""
+        viewport.look_at_all_again(context)
+        end(context)
+        target = context.scene.mobius.target
+        if target is not None and target.name in context.view_layer.objects:
+            target.select_set(True)
+            context.view_layer.objects.active = target
+        return {"FINISHED"}
+
+
+def is_shown(context: bpy.types.Context) -> bool:
+    """Return whether the scene holds a comparison."""
+    return COLLECTION in context.scene.collection.children
+
+
+def end(context: bpy.types.Context) -> None:
+    """Remove the copies, if there are any; the meshes stay."""
+    if not is_shown(context):
+        return
+    collection = bpy.data.collections[COLLECTION]
+    for obj in list(collection.objects):
+        bpy.data.objects.remove(obj)
+    bpy.data.collections.remove(collection)
+
+
+def similarity(moving: Floats, fixed: Floats) -> Floats:
+    """Return the matrix, (4, 4), of rotation, uniform scale and shift that best carries points, (k, 3), onto others.
+
+    Least squares without a reflection: Umeyama, "Least-squares estimation of transformation parameters" (1991).
+    """
+    middle, aim = moving.mean(axis=0), fixed.mean(axis=0)
+    u, stretch, v = np.linalg.svd((fixed - aim).T @ (moving - middle))
+    sign = np.array([1, 1, np.sign(np.linalg.det(u @ v))])
+    turn = (u * sign) @ v
+    size = (stretch @ sign) / max(((moving - middle) ** 2).sum(), 1e-300)
+    matrix = np.eye(4)
+    matrix[:3, :3] = size * turn
+    matrix[:3, 3] = aim - size * turn @ middle
+    return matrix
+
+
+def _beside(first: Floats, second: Floats) -> float:
+    """Return how far the second has to be moved along an axis, of which both take these coordinates, to lie behind."""
+    return float(first.max() - second.min() + GAP * max(np.ptp(first), np.ptp(second)))
+
+
+def _world(obj: bpy.types.Object) -> Floats:
+    """Return the vertices of an object in the world, (n, 3)."""
+    matrix = np.array(obj.matrix_world)
+    return foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy.types.Object:
+    """Put an object with the same mesh into the collection of the comparison."""
+    collection = bpy.data.collections.get(COLLECTION)
+    if collection is None:
+        collection = bpy.data.collections.new(COLLECTION)
+    if not is_shown(context):
+        context.scene.collection.children.link(collection)
+    copy = bpy.data.objects.new(f"{obj.name} (side by side)", obj.data)
+    copy.matrix_world = matrix
+    collection.objects.link(copy)
+    return copy

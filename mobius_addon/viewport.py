@@ -1,0 +1,82 @@
+"""The 3D viewport that a person looks at: what it shows, and from where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..solver.mesh import Floats
+
+
+def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
+    """Return the 3D viewport of the context, or else the largest one; None without a window, as in scripts."""
+    if bpy.app.background:
+        return None
+    if isinstance(context.space_data, bpy.types.SpaceView3D):
+        return context.space_data
+    area = largest_area(context)
+    return area.spaces.active if area is not None else None
+
+
+def largest_area(context: bpy.types.Context) -> bpy.types.Area | None:
+    """Return the largest 3D viewport of the window, or None."""
+    areas = context.screen.areas if context.screen is not None else ()
+    found = [area for area in areas if area.type == "VIEW_3D"]
+    return max(found, key=lambda area: area.width * area.height, default=None)
+
+
+def show_colors(context: bpy.types.Context) -> None:
+    """Have the viewport show the active color attributes of meshes, with a legend."""
+    space = space_of(context)
+    if space is None:
+        return
+    if space.shading.type in ("WIREFRAME", "SOLID"):
+        space.shading.type = "SOLID"
+        space.shading.color_type = "VERTEX"
+    context.window_manager.mobius_view.legend = True
+
+
+def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:
+    """Return the world's axes of a view as rows, (3, 3): to the right, up, and towards the person; the front view's
+    without one."""
+    if space is None or space.region_3d is None:
+        return np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    return np.array(space.region_3d.view_rotation.to_matrix()).T
+
+
+def look_at_selected_alone(context: bpy.types.Context) -> None:
+    """Show the selected objects alone, filling the viewport; nothing is done without a window."""
+    space = space_of(context)
+    if space is not None:
+        if space.local_view:
+            _toggle_local_view(context)
+        _toggle_local_view(context)
+
+
+def look_at_all_again(context: bpy.types.Context) -> None:
+    """Leave the view of some objects alone, if the viewport is in it."""
+    space = space_of(context)
+    if space is not None and space.local_view:
+        _toggle_local_view(context)
+
+
+def look_at_selected(context: bpy.types.Context) -> None:
+    """Fill the viewport with what is selected; nothing is done without a window."""
+    if space_of(context) is not None:
+        with _in_viewport(context):
+            bpy.ops.view3d.view_selected()
+
+
+def _toggle_local_view(context: bpy.types.Context) -> None:
+    with _in_viewport(context):
+        bpy.ops.view3d.localview(frame_selected=True)
+
+
+def _in_viewport(context: bpy.types.Context) -> Any:
+    """Return the context of the 3D viewport that `space_of` finds."""
+    inside = context.area is not None and context.area.type == "VIEW_3D"
+    area = context.area if inside else largest_area(context)
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return context.temp_override(area=area, region=region)
