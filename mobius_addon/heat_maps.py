@@ -39,8 +39,8 @@ class Measure:
     attribute : str
         Name of the color attribute.
     shares : callable
-        Returns where on the scale each vertex is, (n,), 0 to 1; nan at vertices without a value. Takes a `Flattening`, or
-        for maps between surfaces a `Correspondence` and the meshes of source and target.
+        Returns where on the scale each vertex is, (n,), 0 to 1; nan at vertices without a value. Takes a `Flattening`,
+        or for maps between surfaces a `Correspondence` and the meshes of source and target.
     stops : (k, 3) float64
         The scale's sRGB colors, evenly spaced.
     ticks : tuple of str

@@ -133,7 +133,9 @@ _remembered: dict[str, _Picture] = {}
 _handles: dict[str, Any] = {}
 
 
-def _remember(kind: str, objects: tuple[bpy.types.Object, ...], made_for: tuple[int, ...], make: Callable[[], Any]) -> Any:
+def _remember(
+    kind: str, objects: tuple[bpy.types.Object, ...], made_for: tuple[int, ...], make: Callable[[], Any]
+) -> Any:
     """Return what `make` returned, until an object or a choice is another one or a mesh was edited."""
     meshes = tuple(obj.data.session_uid for obj in objects)
     known = _remembered.get(kind)

@@ -123,12 +123,11 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
         else:
             column.operator(MOBIUS_OT_show_discs.bl_idname, icon="UV")
         column = layout.column(align=True)
-        row = column.row()
-        row.label(text="Heat Map on the Target")
-        row.prop(view, "legend")
+        column.label(text="Heat Map on Target")
         row = column.row(align=True)
         for measure in MAP_MEASURES:
             row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
+        layout.prop(view, "legend")
 
 
 class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
@@ -141,10 +140,13 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
         """Draw the choice of data and the button."""
         layout, settings = self.layout, context.scene.mobius
         column = layout.column(align=True)
+        column.emboss = "NONE"
         for kind in KINDS:
             identifier = enum_identifier(kind.identifier)
             icon = "CHECKBOX_HLT" if identifier in settings.kinds else "CHECKBOX_DEHLT"
-            column.prop_enum(settings, "kinds", identifier, icon=icon)
+            row = column.row()
+            row.alignment = "LEFT"
+            row.prop_enum(settings, "kinds", identifier, icon=icon)
         column = layout.column()
         column.scale_y = 1.4
         column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER").kinds = settings.kinds
@@ -238,24 +240,29 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
     """Return the name and the value of each figure of a report."""
     reflected = found["mobius"]["reflected"]
     rows = [
-        (iface_("Matched Value"), f"{found['value']:.2f} / {found['samples']}"),
+        (iface_("Matched Points"), iface_("{:,} of {:,}").format(found["matches"], found["samples"])),
+        (iface_("Matched Value"), f"{found['value']:.2f}"),
         (iface_("Proven Bound"), f"{found['upper_bound']:.2f}"),
-        (iface_("Matched Points"), f"{found['matches']:,}"),
         (iface_("Coverage"), f"{found['coverage']:.0%}"),
         (iface_("Orientation"), iface_("mirrored") if reflected else iface_("not mirrored")),
     ]
-    if (margin := found.get("orientation_margin")) is not None:
-        rows.append((iface_("Wins by"), f"{margin:.1%}"))
-    if (margin := found.get("rival_margin")) is not None:
-        rows.append((iface_("Next Rival"), iface_("{:.1%} behind").format(margin)))
-    rows.append((iface_("Time"), f"{sum(found['seconds'].values()):.1f} s"))
+    if (margin := found["orientation_margin"]) is not None:
+        rows.append((iface_("Not Mirrored") if reflected else iface_("Mirrored"), _behind(margin)))
+    if (margin := found["rival_margin"]) is not None:
+        rows.append((iface_("Next Rival"), _behind(margin)))
+    rows.append((iface_("Time"), iface_("{:.1f} s").format(sum(found["seconds"].values()))))
     return rows
+
+
+def _behind(margin: float) -> str:
+    """Say how far another map lies behind the one taken, as a share of the samples."""
+    return iface_("{:.1%} behind").format(margin) if margin >= 0 else iface_("{:.1%} ahead").format(-margin)
 
 
 def _draw_doubts(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, found: dict[str, Any]) -> None:
     """Say where the surfaces do not decide, each with a button that takes the other choice."""
     near, reflected = found["settings"]["reflect_margin"], found["mobius"]["reflected"]
-    margin, rival = found.get("orientation_margin"), found.get("rival_margin")
+    margin, rival = found["orientation_margin"], found["rival_margin"]
     if margin is not None and margin <= near:
         box = layout.box().column(align=True)
         box.label(text="Ambiguous: mirrored or not?", icon="QUESTION")

@@ -90,7 +90,7 @@ def read_layout(obj: bpy.types.Object) -> Layout | None:
 def pattern_color(disc: Complexes, checks: int = 12) -> Floats:
     """Return linear colors, (n, 4), of a chequered pattern on the unit disc at points, (n,), `checks` across.
 
-    The hues are those of `disc_color`, so that no two checks look alike; their edges are soft, as colors at vertices are.
+    The hues are those of `disc_color`, so that no two checks look alike; edges are soft, as colors at vertices are.
     """
     across, up = (np.sin(np.pi * checks / 2 * x) for x in (disc.real, disc.imag))
     light = np.clip(0.5 + 2 * across * up, 0, 1)

@@ -67,7 +67,7 @@ def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
 
 
 def figures(target: bpy.types.Object) -> dict[str, Any] | None:
-    """Return the report of the alignment that the target's mesh keeps, None if it cannot be read; see `solver.report`."""
+    """Return the `solver.report` of the alignment that the target's mesh keeps, None if it cannot be read."""
     return _parsed(target.data.mobius_alignment.report)
 
 

@@ -39,8 +39,10 @@ def show_colors(context: bpy.types.Context) -> None:
 
 
 def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:
-    """Return the world's axes of a view as rows, (3, 3): to the right, up, and towards the person; the front view's
-    without one."""
+    """Return a view's axes in the world, the front view's without one.
+
+    The rows, (3, 3), point to the right, up, and towards the person.
+    """
     if space is None or space.region_3d is None:
         return np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     return np.array(space.region_3d.view_rotation.to_matrix()).T
@@ -77,6 +79,6 @@ def _toggle_local_view(context: bpy.types.Context) -> None:
 def _in_viewport(context: bpy.types.Context) -> Any:
     """Return the context of the 3D viewport that `space_of` finds."""
     inside = context.area is not None and context.area.type == "VIEW_3D"
-    area = context.area if inside else largest_area(context)
+    area: Any = context.area if inside else largest_area(context)
     region = next(region for region in area.regions if region.type == "WINDOW")
     return context.temp_override(area=area, region=region)

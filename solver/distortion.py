@@ -43,8 +43,7 @@ class Distortion:
 
 def signed_areas(plane: Complexes, faces: Integers) -> Floats:
     """Return the signed area of each triangle in the plane, (m,); positive is counter-clockwise."""
-    a, b, c = (plane[faces[:, k]] for k in range(3))
-    return 0.5 * np.imag(np.conj(b - a) * (c - a))
+    return _areas(plane, faces)
 
 
 def corner_angles(corners: Floats) -> Floats:
@@ -95,9 +94,9 @@ def dilatations(mesh: TriangleMesh, image: Complexes | Floats) -> Floats:
 
 def _areas(image: Complexes | Floats, faces: Integers) -> Floats:
     """Return the area of each triangle, (m,): signed in the plane, not in space."""
-    if image.ndim == 1:
-        return signed_areas(image, faces)
     a, b, c = (image[faces[:, k]] for k in range(3))
+    if image.ndim == 1:
+        return 0.5 * np.imag(np.conj(b - a) * (c - a))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
