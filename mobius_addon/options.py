@@ -175,7 +175,7 @@ class SourceMaskOptions:
 class TransferOptions(SourceMaskOptions):
     """Mixin with the options of a transfer, named as in `attributes.TransferSettings`."""
 
-    targets: bpy.props.EnumProperty(
+    carry_to: bpy.props.EnumProperty(
         name="Carry To",
         description="Which meshes receive",
         items=(
@@ -290,7 +290,35 @@ class TransferOptions(SourceMaskOptions):
     )
 
 
-TRANSFER_OPTIONS = (*SourceMaskOptions.__annotations__, *TransferOptions.__annotations__)
+SOURCE_MASK_OPTIONS = tuple(SourceMaskOptions.__annotations__)
+TRANSFER_OPTIONS = (*SOURCE_MASK_OPTIONS, *TransferOptions.__annotations__)
+
+
+def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
+    """Draw what of the chosen kinds is carried, how it joins what is there, and where."""
+    column = layout.column()
+    column.prop(options, "layers")
+    if options.layers == "named":
+        column.prop(options, "layer_names")
+    column.prop(options, "collisions")
+    column = layout.column()
+    column.prop(options, "mix")
+    column.prop(options, "mix_factor", text="Factor")
+    column = layout.column()
+    for role in ("source_mask", "target_mask"):
+        row = column.row(align=True)
+        row.prop(options, role)
+        if getattr(options, role) != "none":
+            row.prop(options, f"{role}_invert", text="", icon="ARROW_LEFTRIGHT")
+        if getattr(options, role) == "named":
+            column.prop(options, f"{role}_name", text=" ")
+    column.prop(options, "unmatched")
+    column = layout.column(heading="Vertex Groups")
+    column.prop(options, "deform_only")
+    column.prop(options, "normalize")
+    column.prop(options, "limit")
+    column.prop(options, "smallest_weight")
+    layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
 
 
 def source_mask(options: Any) -> Mask:

@@ -14,15 +14,25 @@ from .heat_maps import MAP_MEASURES
 from .jobs import Job, MOBIUS_OT_stop, describe_proof
 from .operators.align import MOBIUS_OT_align
 from .operators.check import MOBIUS_OT_check
+from .operators.conformal_transfer import MOBIUS_OT_conformal_transfer
 from .operators.discs import MOBIUS_OT_show_discs
 from .operators.flatten import MOBIUS_OT_flatten
 from .operators.heat_map import MOBIUS_OT_heat_map
+from .operators.select_unmatched import MOBIUS_OT_select_unmatched
 from .operators.side_by_side import MOBIUS_OT_end_side_by_side, MOBIUS_OT_side_by_side, is_shown
 from .operators.swap import MOBIUS_OT_swap
 from .operators.transfer import MOBIUS_OT_transfer
-from .options import ALIGN_OPTIONS, SCAN_OPTIONS, enum_identifier, repair
+from .options import (
+    ALIGN_OPTIONS,
+    SCAN_OPTIONS,
+    SOURCE_MASK_OPTIONS,
+    TRANSFER_OPTIONS,
+    draw_transfer,
+    enum_identifier,
+    repair,
+)
 from .preferences import preferences
-from .preset_menus import MOBIUS_PT_align_presets
+from .preset_menus import MOBIUS_PT_align_presets, MOBIUS_PT_transfer_presets
 from .usable import why_not, why_not_aligned
 
 
@@ -149,7 +159,30 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
             row.prop_enum(settings, "kinds", identifier, icon=icon)
         column = layout.column()
         column.scale_y = 1.4
-        column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER").kinds = settings.kinds
+        _hand_on(TRANSFER_OPTIONS, settings, column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER"))
+
+
+class MOBIUS_PT_transfer_settings(MobiusPanel, bpy.types.Panel):
+    """What of the chosen kinds is carried, how it joins what is there, and where."""
+
+    bl_label = "Transfer Settings"
+    bl_parent_id = "MOBIUS_PT_transfer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the menu of presets."""
+        MOBIUS_PT_transfer_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings."""
+        layout, settings = self.layout, context.scene.mobius
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "carry_to")
+        draw_transfer(layout, settings)
+        button = layout.operator(MOBIUS_OT_select_unmatched.bl_idname, icon="RESTRICT_SELECT_OFF")
+        _hand_on(SOURCE_MASK_OPTIONS, settings, button)
+        button.edit = True
 
 
 class MOBIUS_PT_scans(MobiusSubPanel, bpy.types.Panel):
@@ -286,13 +319,32 @@ def _draw_sentence(layout: bpy.types.UILayout, sentence: str, icon: str) -> None
         layout.label(text=text, icon="BLANK1" if number else icon, translate=False)
 
 
-register, unregister = bpy.utils.register_classes_factory(
+def _draw_in_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw the entry in Object > Link/Transfer Data."""
+    menu.layout.separator()
+    menu.layout.operator(MOBIUS_OT_conformal_transfer.bl_idname, icon="MOD_DATA_TRANSFER")
+
+
+_register, _unregister = bpy.utils.register_classes_factory(
     (
         MOBIUS_PT_main,
         MOBIUS_PT_result,
         MOBIUS_PT_pictures,
         MOBIUS_PT_transfer,
+        MOBIUS_PT_transfer_settings,
         MOBIUS_PT_scans,
         MOBIUS_PT_alignment,
     )
 )
+
+
+def register() -> None:
+    """Register the panels and the menu's entry."""
+    _register()
+    bpy.types.VIEW3D_MT_make_links.append(_draw_in_menu)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    bpy.types.VIEW3D_MT_make_links.remove(_draw_in_menu)
+    _unregister()

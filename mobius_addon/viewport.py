@@ -64,8 +64,11 @@ def look_at_all_again(context: bpy.types.Context) -> None:
         _toggle_local_view(context)
 
 
-def look_at_selected(context: bpy.types.Context) -> None:
-    """Fill the viewport with what is selected; nothing is done without a window."""
+def edit(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Go to Edit Mode of an object and, where there is a window, look at what is selected of it."""
+    obj.hide_set(False)
+    context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
     if space_of(context) is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()

@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import align, check, discs, flatten, heat_map, select_unmatched, side_by_side, swap, transfer
+from . import align, check, conformal_transfer, discs, flatten, heat_map, select_unmatched, side_by_side, swap, transfer
 
 _register, _unregister = bpy.utils.register_classes_factory(
     (
@@ -12,6 +12,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
         align.MOBIUS_OT_align,
         transfer.MOBIUS_OT_transfer,
         select_unmatched.MOBIUS_OT_select_unmatched,
+        conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,
         discs.MOBIUS_OT_show_discs,
         side_by_side.MOBIUS_OT_side_by_side,

@@ -23,9 +23,8 @@ from ..usable import why_not_pair
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """An alignment that was computed, with what it was computed from."""
+    """What an alignment's work returns."""
 
-    surfaces: tuple[Surface, Surface]
     alignment: solver.Alignment
     correspondence: solver.Correspondence
 
@@ -48,11 +47,12 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         options={"SKIP_SAVE"},
     )
     properties: Any
+    surfaces: tuple[Surface, Surface]
 
     def begin(self, context: bpy.types.Context, source: bpy.types.Object, target: bpy.types.Object) -> Work:
         """Read both meshes, and return the work that gives their `Aligned`."""
         self._names = source.name, target.name
-        surfaces = read_surface(source), read_surface(target)
+        self.surfaces = surfaces = read_surface(source), read_surface(target)
         limit = self.time_limit
         if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
             limit = kept.time_limit
@@ -63,14 +63,16 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         asked = surfaces[0].fingerprint(), surfaces[1].fingerprint(), options, largest_part
 
         def work(report: Report) -> Aligned:
-            if _last.get("asked") != asked:
-                found = aligned(*meshes, options, largest_part=largest_part, progress=report)
-                _last.update(asked=asked, found=found)
-            return Aligned(surfaces, *_last["found"])
+            found = _last.get(asked)
+            if found is None:
+                found = Aligned(*aligned(*meshes, options, largest_part=largest_part, progress=report))
+                _last.clear()
+                _last[asked] = found
+            return found
 
         return work
 
-    def objects(self, surfaces: tuple[Surface, Surface]) -> tuple[bpy.types.Object, bpy.types.Object]:
+    def objects(self) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Return source and target, if they are still what was read.
 
         Raises
@@ -79,7 +81,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
             They are not.
         """
         found = []
-        for name, surface in zip(self._names, surfaces, strict=True):
+        for name, surface in zip(self._names, self.surfaces, strict=True):
             obj = bpy.data.objects.get(name)
             if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
                 raise Refusal(
@@ -93,8 +95,8 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
 
     def keep(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
         """Write an alignment on both meshes and report it."""
-        write_alignment(source, target, done.alignment, done.correspondence, done.surfaces)
-        stored_alignment.store(target, source, done.alignment, done.correspondence, done.surfaces)
+        write_alignment(source, target, done.alignment, done.correspondence, self.surfaces)
+        stored_alignment.store(target, source, done.alignment, done.correspondence, self.surfaces)
         for warning in [scale_warning(source), scale_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, warning)
@@ -102,7 +104,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
 
 
 # a cache, never the truth: it can be emptied at any time
-_last: dict[str, Any] = {}
+_last: dict[Any, Aligned] = {}
 
 
 def forget_last() -> None:
@@ -136,7 +138,7 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: Aligned) -> None:
         """Write on both meshes, if they are still what was read."""
-        self.keep(*self.objects(result.surfaces), result)
+        self.keep(*self.objects(), result)
 
 
 def write_alignment(

@@ -68,9 +68,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
             select_vertices(obj.data, trouble)
             context.tool_settings.mesh_select_mode = (True, False, False)
             if self.edit:
-                context.view_layer.objects.active = obj
-                bpy.ops.object.mode_set(mode="EDIT")
-                viewport.look_at_selected(context)
+                viewport.edit(context, obj)
             line += f" ({int(trouble.sum()):,} vertices are selected: see them in Edit Mode)"
         self.report({"WARNING"}, line)
         return {"FINISHED"}

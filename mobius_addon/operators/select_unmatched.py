@@ -6,11 +6,11 @@ import numpy as np
 
 from ...solver import MeshError
 from ...solver.mesh import plural
-from .. import stored_alignment
+from .. import stored_alignment, viewport
 from ..attributes import mask_weights, unmatched_vertices
 from ..mesh_data import Refusal, foreach, read_surface
 from ..options import SourceMaskOptions, source_mask
-from ..usable import why_not_pair
+from ..usable import why_not_aligned
 from .check import select_vertices
 
 
@@ -24,14 +24,17 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
     extend: bpy.props.BoolProperty(
         name="Extend", description="Add to what is selected already", default=False, options={"SKIP_SAVE"}
     )
+    edit: bpy.props.BoolProperty(
+        name="Edit",
+        description="Go to Edit Mode where something is selected, and look at it",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned."""
-        settings = context.scene.mobius
-        reason = why_not_pair(settings, context.scene, writes_source=False)
-        if reason is None and not stored_alignment.exists(settings.target, settings.source):
-            reason = stored_alignment.missing(settings.target, settings.source)
+        reason = why_not_aligned(context.scene.mobius, context.scene)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -51,6 +54,8 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
             chosen = unmatched | foreach(target.data.vertices, "select", 1, np.bool_)
         select_vertices(target.data, chosen)
         context.tool_settings.mesh_select_mode = (True, False, False)
+        if self.edit and chosen.any():
+            viewport.edit(context, target)
         number = plural(int(unmatched.sum()), "vertex")
         share = surfaces[1].mesh.vertex_areas[unmatched].sum() / surfaces[1].mesh.area
         verb = "has" if unmatched.sum() == 1 else "have"

@@ -1,10 +1,12 @@
 """Carry data from the source to the target, or to many targets, through their last alignments."""
 
 # no postponed annotations here: Blender reads the properties from them
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from .. import stored_alignment
 from ..attributes import (
@@ -17,10 +19,10 @@ from ..attributes import (
     read_transfer,
 )
 from ..evaluated import evaluated, evaluated_surface
-from ..jobs import JobOperator, Report, Work
+from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
-from ..options import TransferOptions, transfer_settings
-from ..usable import why_not, why_not_pair
+from ..options import TransferOptions, draw_transfer, transfer_settings
+from ..usable import why_not, why_not_aligned
 
 
 class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
@@ -34,15 +36,18 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned, or a source with selected others that have."""
-        settings = context.scene.mobius
-        reason = why_not_pair(settings, context.scene, writes_source=False)
-        if reason is None and not stored_alignment.exists(settings.target, settings.source):
-            reason = stored_alignment.missing(settings.target, settings.source)
-        if context.window_manager.mobius_job.running:
-            reason = "Other work is running: press ESC to stop it"
+        reason = why_not_aligned(context.scene.mobius, context.scene) or why_busy()
         if reason:
             cls.poll_message_set(reason)
         return not reason
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the choices."""
+        self.layout.use_property_split = True
+        column = self.layout.column()
+        column.prop(self, "carry_to")
+        column.prop(self, "kinds")
+        draw_transfer(self.layout, self)
 
     def prepare(self, context: bpy.types.Context) -> Work:
         """Read source and targets."""
@@ -51,7 +56,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
             raise Refusal("Choose at least one kind of data to transfer")
         source = scene.mobius.source
         targets = [scene.mobius.target]
-        if self.targets == "selected":
+        if self.carry_to == "selected":
             targets = selected_targets(context, source)
         self._targets: list[tuple[str, Surface]] = []
         readings: list[Reading] = []
@@ -78,10 +83,15 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
             objects.append(obj)
         for obj, plan in zip(objects, result, strict=True):
             plan.write(obj)
-            for warning in plan.warnings:
-                self.report({"WARNING"}, warning)
-            counts, remark = describe_counts(plan.counts()), plan.unmatched.remark()
-            self.report({"INFO"}, f"'{obj.name}' has {counts} from '{self._source}'{remark}")
+            tell(self.report, obj.name, self._source, plan)
+
+
+def tell(report: Callable[[set[str], str], None], target: str, source: str, plan: Transfer) -> None:
+    """Report what a transfer has written."""
+    for warning in plan.warnings:
+        report({"WARNING"}, warning)
+    carried = describe_counts(plan.counts())
+    report({"INFO"}, rpt_("'{}' has {} from '{}'{}").format(target, carried, source, plan.unmatched.remark()))
 
 
 def read_pair(

@@ -1,0 +1,96 @@
+"""Align and transfer in one go, for two selected meshes."""
+
+# no postponed annotations here: Blender reads the properties from them
+from contextlib import suppress
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...solver import Correspondence
+from .. import results, stored_alignment
+from ..attributes import SHARED_COLOR, SHARED_LAYOUT
+from ..jobs import Report, Work, why_busy
+from ..mesh_data import Refusal, read_surface
+from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, TransferOptions, draw_transfer, transfer_settings
+from ..usable import why_not, why_not_two
+from .align import Aligned, AlignOperator
+from .transfer import read_through, tell
+
+
+class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Operator):
+    """Find which point of the active mesh corresponds to which of the other selected mesh, and carry its data over."""
+
+    bl_idname = "mobius.conformal_transfer"
+    bl_label = "Transfer by Conformal Map"
+    bl_options = {"REGISTER", "UNDO"}
+    job_title = "Transfer by Conformal Map"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Allow for two selected meshes, of which the active one is the target."""
+        reason = _why_not(context) or why_busy()
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Take what was chosen in the panel, where the caller says nothing else."""
+        for name in (*ALIGN_OPTIONS, *SCAN_OPTIONS, *TRANSFER_OPTIONS):
+            if not self.properties.is_property_set(name, ghost=False):
+                setattr(self, name, getattr(context.scene.mobius, name))
+        return self.execute(context)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw what can be changed without a new search."""
+        self.layout.use_property_split = True
+        self.layout.column().prop(self, "kinds")
+        draw_transfer(self.layout, self)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        """Read both meshes; what is known of this pair is not searched for again."""
+        if not self.kinds:
+            raise Refusal(rpt_("Choose at least one kind of data to transfer"))
+        source, target = _pair(context)
+        for obj in (source, target):
+            results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
+        work = self.begin(context, source, target)
+        self._known = None
+        if stored_alignment.exists(target, source):
+            surfaces = read_surface(source), read_surface(target)
+            with suppress(Refusal):  # it was edited since
+                self._known = stored_alignment.load(target, source, surfaces)
+        known = self._known
+
+        def align_if_needed(report: Report) -> Aligned | Correspondence:
+            return work(report) if known is None else known
+
+        return align_if_needed
+
+    def finish(self, context: bpy.types.Context, result: Aligned | Correspondence) -> None:
+        """Carry the data through the correspondence, then write both."""
+        source, target = self.objects()
+        found = result.correspondence if isinstance(result, Aligned) else result
+        settings = transfer_settings(self)
+        plan = read_through(source, target, self.surfaces, found, settings).carry()
+        if isinstance(result, Aligned):
+            self.keep(source, target, result)
+        plan.write(target)
+        tell(self.report, target.name, source.name, plan)
+        context.scene.mobius.source, context.scene.mobius.target = source, target
+
+
+def _pair(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """Return the other selected object and the active one."""
+    target = context.object
+    return next(obj for obj in context.selected_objects if obj != target), target
+
+
+def _why_not(context: bpy.types.Context) -> str | None:
+    """Return why the selection cannot be used, or None if it can."""
+    chosen, target = context.selected_objects, context.object
+    if target is None or target not in chosen or len(chosen) != 2:
+        return rpt_("Select two meshes, the target last: it is the active one")
+    source, target = _pair(context)
+    scene = context.scene
+    reason = why_not(source, "source mesh", scene) or why_not(target, "target mesh", scene)
+    return reason or why_not_two(source, target)
