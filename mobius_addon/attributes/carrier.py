@@ -66,6 +66,8 @@ class Carrier:
         whole = self._whole_corners
         if self.gap == "leave" or whole.all():
             return result, whole
+        if self.gap == "nearest":
+            return result[self._nearest_corner], self._nearest_corner >= 0
         # around the gap each vertex gives the value of one of its corners beside it, never a mean across a seam
         known = self.correspondence.face[vertex] >= 0
         at_vertex = np.zeros((len(self.correspondence.face), *carried.shape[1:]))
@@ -101,15 +103,17 @@ class Carrier:
 
     def nearest_corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), each from the nearest corner; returns as `points`."""
-        everywhere = self._everywhere
-        found = everywhere._corner_origin
+        found = self._corner_origin[self._nearest_corner]
+        found[self._nearest_corner < 0] = -1
         result = np.zeros((len(found), *values.shape[1:]), values.dtype)
         result[found >= 0] = values[found[found >= 0]]
-        return result, everywhere._whole_corners
+        return result, found >= 0
 
     def faces(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per polygon, (p_source, ...), from the one that holds its middle; returns as `points`."""
-        origin = self._everywhere._polygon_origin
+        first = np.searchsorted(self.target.corner_polygon, np.arange(len(self._whole_polygons)))
+        corner = self._nearest_corner[first]
+        origin = np.where(corner < 0, -1, self._polygon_origin[self.target.corner_polygon[corner]])
         return values[origin], origin >= 0
 
     def edges(self, values: Values) -> tuple[Values, Booleans]:
@@ -172,6 +176,18 @@ class Carrier:
     @cached_property
     def _nearest(self) -> Integers:
         return nearest_known(self.target.mesh, self.correspondence.face >= 0)
+
+    @cached_property
+    def _nearest_corner(self) -> Integers:
+        """The corner of the target whose value each corner takes, (c,): in a gap the nearest one outside; -1: none."""
+        own, vertex = np.arange(len(self.target.corner_vertex)), self.target.corner_vertex
+        whole = self._whole_corners
+        if self.gap == "leave" or whole.all():
+            return np.where(whole, own, -1)
+        corner_at = np.full(len(self.correspondence.face), -1)
+        corner_at[vertex[whole]] = own[whole]
+        nearest = nearest_known(self.target.mesh, corner_at >= 0)
+        return np.where(whole, own, np.where(nearest < 0, -1, corner_at[nearest])[vertex])
 
     @cached_property
     def _everywhere(self) -> Carrier:

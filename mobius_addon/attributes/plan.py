@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,8 @@ from .table import KINDS, ROWS, Row
 from .unmatched import Unmatched
 from .vertex_groups import keep_order, read_weights
 from .weights import tidied
+
+_LABELS = {kind.identifier: kind.label for kind in KINDS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,17 +61,7 @@ class Transfer:
 
     def write(self, obj: bpy.types.Object) -> None:
         """Write every layer on the target; if that fails, the target is as it was."""
-        with _restored_on_failure(obj):
-            order = [group.name for group in obj.vertex_groups]
-            for layer in self.layers:
-                layer.row.access.write(obj, layer.name, layer.values, layer.covered, layer.about)
-            keep_order(obj, order)
-            mesh = obj.data
-            if self.shown_uv is not None:
-                mesh.uv_layers.active = mesh.uv_layers[self.shown_uv]
-                mesh.uv_layers[self.shown_uv].active_render = True
-            if self.shown_color is not None:
-                mesh.attributes.active_color_name = mesh.attributes.default_color_name = self.shown_color
+        write_transfers([(obj, self)])
 
     def counts(self) -> dict[str, int]:
         """Return how many layers of each kind are written, kinds with none left out."""
@@ -116,7 +108,7 @@ class Reading:
         warnings = list(self.warnings)
         layers = []
         for number, pending in enumerate(self.pending):
-            step = Progress(f"'{pending.source_name}' for '{self.names[1]}'", number / len(self.pending))
+            step = Progress(f"{_LABELS[pending.row.kind]} of '{self.names[1]}'", number / len(self.pending))
             if progress is not None and progress(step) is False:
                 raise Cancelled
             carried = self._carried(pending)
@@ -292,16 +284,42 @@ def _renamed(layers: list[Carried], kind: str, shown: str | None) -> str | None:
     return None if shown is None else names.get(shown, next(iter(names.values()), None))
 
 
+def write_transfers(pairs: Sequence[tuple[bpy.types.Object, Transfer]]) -> None:
+    """Write what was carried to each target; if one of them fails, all are as they were."""
+    with ExitStack() as stack:
+        for obj, _ in pairs:
+            stack.enter_context(_restored_on_failure(obj))
+        for obj, transfer in pairs:
+            _write(obj, transfer)
+
+
+def _write(obj: bpy.types.Object, transfer: Transfer) -> None:
+    order = [group.name for group in obj.vertex_groups]
+    for layer in transfer.layers:
+        layer.row.access.write(obj, layer.name, layer.values, layer.covered, layer.about)
+    keep_order(obj, order)
+    mesh = obj.data
+    if transfer.shown_uv is not None:
+        mesh.uv_layers.active = mesh.uv_layers[transfer.shown_uv]
+        mesh.uv_layers[transfer.shown_uv].active_render = True
+    if transfer.shown_color is not None:
+        mesh.attributes.active_color_name = mesh.attributes.default_color_name = transfer.shown_color
+
+
 @contextmanager
 def _restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
     """Put the object's mesh back as it was if the body fails: Blender takes no undo step of a failed operator."""
     mesh = obj.data
-    name, backup = mesh.name, mesh.copy()  # layers are shared until they are written: this costs next to nothing
+    keys = mesh.shape_keys
+    names = mesh.name, keys.name if keys else ""
+    backup = mesh.copy()  # layers are shared until they are written: this costs next to nothing
     try:
         yield
     except BaseException:
         mesh.user_remap(backup)
         bpy.data.meshes.remove(mesh)
-        backup.name = name
+        backup.name = names[0]
+        if backup.shape_keys:
+            backup.shape_keys.name = names[1]
         raise
     bpy.data.meshes.remove(backup)

@@ -17,6 +17,7 @@ from ..attributes import (
     carrier_between,
     mask_weights,
     read_transfer,
+    write_transfers,
 )
 from ..evaluated import evaluated, evaluated_surface
 from ..jobs import JobOperator, Report, Work, why_busy
@@ -81,8 +82,9 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
             if read_surface(obj).fingerprint() != surface.fingerprint():
                 raise Refusal(f"'{name}' was edited during the transfer: transfer again")
             objects.append(obj)
-        for obj, plan in zip(objects, result, strict=True):
-            plan.write(obj)
+        pairs = list(zip(objects, result, strict=True))
+        write_transfers(pairs)
+        for obj, plan in pairs:
             tell(self.report, obj.name, self._source, plan)
 
 
