@@ -20,8 +20,8 @@ NEEDED = (
     "scipy.spatial.transform",
 )
 
-BROUGHT = (3, 11), (3, 13)
-"""Versions of Python that the zips hold scipy for."""
+BROUGHT = [(3, 11), (3, 13), *([(3, 14)] if sys.platform == "linux" else [])]
+"""Versions of Python that the zips hold scipy for; the last one for Blenders that Linux distributions build."""
 
 LETTER = 8
 """Width of a letter in pixels, at a scale of 1; rather too wide than cut off."""
@@ -41,7 +41,7 @@ def reasons() -> list[str]:
         what_to_do = "Remove Möbius and install the zip that is made for this system"
         if sys.version_info[:2] not in BROUGHT:
             python = ".".join(map(str, sys.version_info[:2]))
-            what_to_do = f"Möbius brings it for Python 3.11 and 3.13, which Blender's own builds have, not for {python}"
+            what_to_do = f"Möbius brings it for the Python of Blender's own builds, 3.11 and 3.13, not for {python}"
         return [f"'{package}' cannot be loaded: {lines[0]}", what_to_do]
     return []
 

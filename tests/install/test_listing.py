@@ -39,15 +39,16 @@ def test_the_zip_holds_scipy_for_both_pythons_and_the_kernels(built: Path) -> No
     named = {wheel.removeprefix("./") for wheel in MANIFEST["wheels"]}
     wheels = wheels_in(built)
     assert wheels <= named
-    assert sorted(Path(wheel).name.split("-")[0] for wheel in wheels) == ["mobius_kernels", "scipy", "scipy"]
-    assert {wheel.split("-")[2] for wheel in wheels} == {"cp311", "cp313", "py3"}
+    assert {Path(wheel).name.split("-")[0] for wheel in wheels} == {"mobius_kernels", "scipy"}
+    assert {"cp311", "cp313", "py3"} <= {wheel.split("-")[2] for wheel in wheels}
+    assert len(wheels) == len({wheel.split("-")[2] for wheel in wheels})
 
 
 def test_the_scipy_in_the_zip_is_the_pinned_one(built: Path) -> None:
     pinned = dict(reversed(x.split()) for x in (ROOT / "release/wheels.sha256").read_text().splitlines())
     with zipfile.ZipFile(built) as archive:
         found = {Path(x).name: hashlib.sha256(archive.read(x)).hexdigest() for x in wheels_in(built) if "/scipy-" in x}
-    assert len(found) == 2
+    assert len(found) >= 2
     assert found == {name: pinned[name] for name in found}
 
 
@@ -63,8 +64,8 @@ def test_every_platform_has_its_kernels_and_scipy(platform: str) -> None:
     names = [Path(wheel).name for wheel in MANIFEST["wheels"]]
     mine = [name for name in names if build_module().runs_on(name, platform)]
     kinds = {(name.split("-")[0], name.split("-")[2]) for name in mine}
-    # Blender for Intel Macs ended with Python 3.11
-    pythons = ["cp311"] if platform == "macos-x64" else ["cp311", "cp313"]
+    # Blender for Intel Macs ended with Python 3.11; Linux distributions build theirs for 3.14
+    pythons = {"macos-x64": ["cp311"], "linux-x64": ["cp311", "cp313", "cp314"]}.get(platform, ["cp311", "cp313"])
     assert kinds == {("mobius_kernels", "py3")} | {("scipy", python) for python in pythons}
     assert len(mine) == len(kinds)
 

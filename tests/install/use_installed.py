@@ -20,13 +20,23 @@ MODULE = "bl_ext.user_default.mobius"
 def traces() -> set[str]:
     """Everything of ours that is in this process that bears our name."""
     found = {name for name in dir(bpy.types) if "mobius" in name.lower()} | {f"ops.{x}" for x in dir(bpy.ops.mobius)}
-    for cls in bpy.types.bpy_struct.__subclasses__():
+    for cls in (bpy.types.Scene, bpy.types.Object, bpy.types.Mesh, bpy.types.WindowManager):
         found |= {f"{cls.__name__}.{name}" for name in dir(cls) if name.startswith("mobius")}
     for name in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, name)
         for handler in handlers if isinstance(handlers, list) else ():
             if "mobius" in handler.__module__:
                 found.add(f"{name}: {handler.__module__}")
+    for cls in (
+        *bpy.types.Menu.__subclasses__(),
+        *bpy.types.Panel.__subclasses__(),
+        *bpy.types.Header.__subclasses__(),
+    ):
+        for function in getattr(getattr(cls, "draw", None), "_draw_funcs", ()):
+            if function.__module__.startswith(MODULE):
+                found.add(f"{cls.__name__}: {function.__name__}")
+    for keymap in bpy.context.window_manager.keyconfigs.addon.keymaps:
+        found |= {f"key: {item.idname}" for item in keymap.keymap_items if item.idname.startswith("mobius.")}
     for kept in gc.get_objects():
         if callable(kept) and str(getattr(kept, "__module__", "")).startswith(MODULE) and is_timer(kept):
             found.add(f"timer: {kept}")
@@ -91,7 +101,7 @@ def main(path: str) -> None:
     )
     require(addon_utils.check(MODULE) == (True, True), "enabled")
     enabled = traces()
-    require("MOBIUS_PT_main" in enabled, f"the panel is there: {enabled}")
+    require({"MOBIUS_PT_main", "Scene.mobius"} <= enabled, f"the panel is there: {enabled}")
     align_and_transfer()
     scipy = Path(sys.modules["scipy"].__file__ or "").resolve()
     require(user in scipy.parents, f"scipy is the one in the zip, not {scipy}")
