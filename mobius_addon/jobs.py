@@ -16,10 +16,12 @@ from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Cancelled, MeshError, Progress
 from .mesh_data import Refusal
+from .registration import register_factory
 
 Report = Callable[[Progress], bool | None]
 Work = Callable[[Report], Any]
@@ -44,7 +46,7 @@ class Job:
 
     def __init__(self, work: Work, title: str = "") -> None:
         self.title = title
-        self.progress = Progress("Starting", 0.0)
+        self.progress = Progress(n_("Starting"), 0.0)
         self.result: Any = None
         self.error: BaseException | None = None
         self._work = work
@@ -209,7 +211,7 @@ class MOBIUS_OT_stop(bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Allow while work is under way."""
         if Job.current is None:
-            cls.poll_message_set("Nothing is being computed")
+            cls.poll_message_set(rpt_("Nothing is being computed"))
         return Job.current is not None
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
@@ -219,7 +221,7 @@ class MOBIUS_OT_stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_register, _unregister = bpy.utils.register_classes_factory((MOBIUS_OT_stop,))
+_register, _unregister = register_factory((MOBIUS_OT_stop,))
 
 
 def register() -> None:

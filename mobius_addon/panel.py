@@ -239,7 +239,7 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     settings = context.scene.mobius
     obj = getattr(settings, role)
     column = layout.column(align=True)
-    column.label(text={"source": "Source", "target": "Target"}[role])
+    column.label(text=iface_("Source") if role == "source" else iface_("Target"), translate=False)
     column.prop(settings, role, text="", icon="OUTLINER_OB_MESH")
     if obj is None:
         return
@@ -299,7 +299,7 @@ def _draw_doubts(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
     if margin is not None and margin <= near:
         box = layout.box().column(align=True)
         box.label(text="Ambiguous: mirrored or not?", icon="QUESTION")
-        text = "Take Not Mirrored" if reflected else "Take Mirrored"
+        text = iface_("Take Not Mirrored") if reflected else iface_("Take Mirrored")
         button = box.operator(MOBIUS_OT_align.bl_idname, text=text, icon="MOD_MIRROR")
         _hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
         button.reflect = "never" if reflected else "always"
@@ -307,7 +307,7 @@ def _draw_doubts(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
         box = layout.box().column(align=True)
         box.label(text="Ambiguous: is it symmetric?", icon="QUESTION")
         taken = found["settings"]["take_rival"]
-        text = "Take the Best Again" if taken else "Take the Rival"
+        text = iface_("Take the Best Again") if taken else iface_("Take the Rival")
         button = box.operator(MOBIUS_OT_align.bl_idname, text=text, icon="FILE_REFRESH")
         _hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
         button.take_rival = not taken

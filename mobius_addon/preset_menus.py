@@ -7,6 +7,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from .options import ALIGN_OPTIONS, TRANSFER_OPTIONS
+from .registration import register_factory
 
 _SHIPPED = str(Path(__file__).parent)
 
@@ -51,7 +52,7 @@ class MOBIUS_OT_transfer_preset_add(AddPresetBase, bpy.types.Operator):
     preset_values = [f"settings.{name}" for name in TRANSFER_OPTIONS]
 
 
-_register, _unregister = bpy.utils.register_classes_factory(
+_register, _unregister = register_factory(
     (
         MOBIUS_PT_align_presets,
         MOBIUS_OT_align_preset_add,

@@ -85,7 +85,7 @@ class MobiusView(bpy.types.PropertyGroup):
     legend: bpy.props.BoolProperty(
         name="Legend",
         description="Say in the viewport what the colors of a heat map mean, while one is the active color attribute "
-        "of the active object",
+        "of the active object or of the target",
         default=False,
         update=_show_or_hide,
     )

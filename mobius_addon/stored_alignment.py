@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Alignment, Correspondence, report
 from .mesh_data import Refusal, Surface
@@ -63,7 +64,7 @@ def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
 
 def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
     """Return the sentence for a pair without an alignment."""
-    return f"'{target.name}' has not been aligned with '{source.name}' yet: press Align first"
+    return rpt_("'{}' has not been aligned with '{}' yet: press Align first").format(target.name, source.name)
 
 
 def figures(target: bpy.types.Object) -> dict[str, Any] | None:
@@ -95,7 +96,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
         (target, target_surface, kept.target_fingerprint),
     ):
         if surface.fingerprint() != fingerprint:
-            raise Refusal(f"'{obj.name}' has been edited since it was aligned: press Align again")
+            raise Refusal(rpt_("'{}' has been edited since it was aligned: press Align again").format(obj.name))
     arrays = _unpack(kept.packed, target.name)
     return Correspondence(
         face=arrays["face"].astype(np.intp),
@@ -112,4 +113,4 @@ def _unpack(packed: bytes, name: str) -> dict[str, Any]:
         with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
             return dict(arrays)
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, KeyError) as error:
-        raise Refusal(f"'{name}' keeps an alignment that is damaged: press Align again") from error
+        raise Refusal(rpt_("'{}' keeps an alignment that is damaged: press Align again").format(name)) from error

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 
 from ..solver import MeshError, Topology, TriangleMesh, topology
 from . import edits
@@ -78,13 +79,14 @@ def _line(mesh: TriangleMesh, repair: Repair) -> Line:
 
 def _problem(found: Topology, repair: Repair) -> tuple[str, str] | None:
     """Return the first thing that is in the way, and what to do about it."""
+    loops = found.boundary_loops
     for count, what, remedy in (
-        (len(found.non_manifold_edges), "{:,} edges with over 2 faces:", "delete the extra faces"),
-        (len(found.non_manifold_vertices), "{:,} points where parts touch:", "split them"),
-        (found.parts if found.parts > 1 else 0, "{:,} separate parts:", "keep one, or turn on Largest Part"),
-        (int(not found.boundary_loops), "closed surface:", "cut it first"),
-        (0 if repair.fill_holes else len(found.boundary_loops[1:]), "{:,} openings:", "turn on Fill Holes"),
-        (found.handles, "{:,} handles, as of a cup:", "cut through them and fill"),
+        (len(found.non_manifold_edges), n_("{:,} edges with over 2 faces:"), n_("delete the extra faces")),
+        (len(found.non_manifold_vertices), n_("{:,} points where parts touch:"), n_("split them")),
+        (found.parts if found.parts > 1 else 0, n_("{:,} separate parts:"), n_("keep one, or turn on Largest Part")),
+        (int(not loops), n_("closed surface:"), n_("cut it first")),
+        (0 if repair.fill_holes else len(loops[1:]), n_("{:,} openings:"), n_("turn on Fill Holes")),
+        (found.handles, n_("{:,} handles, as of a cup:"), n_("cut through them and fill")),
     ):
         if count:
             return iface_(what).format(count), iface_(remedy)

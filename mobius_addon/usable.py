@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import stored_alignment
 
@@ -21,16 +22,20 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
     writes : bool
         Whether its data will be changed.
     """
+    called = rpt_(role)
     if obj is None:
-        return f"Choose a {role} first"
+        return rpt_("Choose a {} first").format(called)
     if obj.type != "MESH":
-        return f"'{obj.name}' is no mesh: convert it (Object > Convert > Mesh) or choose another {role}"
+        text = rpt_("'{}' is no mesh: convert it (Object > Convert > Mesh) or choose another {}")
+        return text.format(obj.name, called)
     if not is_in_scene(obj, scene):
-        return f"'{obj.name}' is not in this scene: choose another {role}"
+        return rpt_("'{}' is not in this scene: choose another {}").format(obj.name, called)
     if obj.mode != "OBJECT":
-        return f"'{obj.name}' is in {obj.mode.replace('_', ' ').title()} Mode: switch to Object Mode first"
+        mode = obj.mode.replace("_", " ").title()
+        return rpt_("'{}' is in {} Mode: switch to Object Mode first").format(obj.name, mode)
     if writes and not (obj.is_editable and obj.data.is_editable):
-        return f"'{obj.name}' is linked from another file: make it local first (Object > Relations > Make Local)"
+        text = rpt_("'{}' is linked from another file: make it local first (Object > Relations > Make Local)")
+        return text.format(obj.name)
     return None
 
 
@@ -52,12 +57,13 @@ def why_not_pair(
 def why_not_two(source: bpy.types.Object, target: bpy.types.Object) -> str | None:
     """Return why two meshes are not two, or None if they are."""
     if source == target:
-        return f"'{source.name}' is both source and target: choose two objects"
+        return rpt_("'{}' is both source and target: choose two objects").format(source.name)
     if source.data == target.data:
-        return (
-            f"'{source.name}' and '{target.name}' share one mesh: make one single-user first "
+        text = rpt_(
+            "'{}' and '{}' share one mesh: make one single-user first "
             "(Object > Relations > Make Single User > Object & Data)"
         )
+        return text.format(source.name, target.name)
     return None
 
 

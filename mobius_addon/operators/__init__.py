@@ -2,9 +2,10 @@
 
 import bpy
 
+from ..registration import register_factory
 from . import align, check, conformal_transfer, discs, flatten, heat_map, select_unmatched, side_by_side, swap, transfer
 
-_register, _unregister = bpy.utils.register_classes_factory(
+_register, _unregister = register_factory(
     (
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,

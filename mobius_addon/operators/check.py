@@ -4,6 +4,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -39,7 +40,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow wherever objects can be looked at."""
         if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode first")
+            cls.poll_message_set(rpt_("Switch to Object Mode first"))
             return False
         return True
 

@@ -1,6 +1,7 @@
 """Show the two discs in a UV editor."""
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from .. import viewport
 from ..usable import why_not_aligned
@@ -18,7 +19,7 @@ class MOBIUS_OT_show_discs(bpy.types.Operator):
         """Allow in a window, for two meshes that have been aligned."""
         reason = why_not_aligned(context.scene.mobius, context.scene, writes=False)
         if bpy.app.background:
-            reason = "Blender runs without a window"
+            reason = rpt_("Blender runs without a window")
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -30,7 +31,7 @@ class MOBIUS_OT_show_discs(bpy.types.Operator):
         if area is None:
             area = _split_off(context)
             if area is None:
-                self.report({"ERROR"}, "There is no room for a UV editor: open one by hand")
+                self.report({"ERROR"}, rpt_("There is no room for a UV editor: open one by hand"))
                 return {"CANCELLED"}
         region = next(region for region in area.regions if region.type == "WINDOW")
         with context.temp_override(area=area, region=region):

@@ -85,10 +85,10 @@ class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow where the copies are."""
         if not is_shown(context):
-            cls.poll_message_set("Nothing is shown side by side")
+            cls.poll_message_set(rpt_("Nothing is shown side by side"))
             return False
         if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode first")
+            cls.poll_message_set(rpt_("Switch to Object Mode first"))
             return False
         return True
 

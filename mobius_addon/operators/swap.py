@@ -1,6 +1,7 @@
 """Exchange source and target."""
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 
 class MOBIUS_OT_swap(bpy.types.Operator):
@@ -15,7 +16,7 @@ class MOBIUS_OT_swap(bpy.types.Operator):
         """Allow where something is chosen."""
         settings = context.scene.mobius
         if settings.source is None and settings.target is None:
-            cls.poll_message_set("Choose a source or target mesh first")
+            cls.poll_message_set(rpt_("Choose a source or target mesh first"))
             return False
         return True
 

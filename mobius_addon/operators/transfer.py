@@ -54,7 +54,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
         """Read source and targets."""
         scene, settings = context.scene, transfer_settings(self)
         if not settings.kinds:
-            raise Refusal("Choose at least one kind of data to transfer")
+            raise Refusal(rpt_("Choose at least one kind of data to transfer"))
         source = scene.mobius.source
         targets = [scene.mobius.target]
         if self.carry_to == "selected":

@@ -357,6 +357,74 @@ def test_stored_and_loaded_correspondences_are_equal(pair: tuple[Any, Any]) -> N
     assert loaded.source_size == found.source_size
 
 
+# align and transfer in one go
+
+
+def choose(*objects: Any) -> None:
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in objects)
+    activate(objects[-1])
+
+
+def test_two_selected_meshes_are_aligned_and_the_active_one_receives(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    bpy.context.scene.mobius.source = bpy.context.scene.mobius.target = None
+    choose(source, target)
+    assert bpy.ops.mobius.conformal_transfer(**QUICK | {"refine": "mobius"}) == {"FINISHED"}
+    assert np.abs(weights(target, "Right") - (positions(target)[:, 0] + 1) / 2).max() < 0.1
+    settings = bpy.context.scene.mobius
+    assert (settings.source, settings.target) == (source, target)
+    assert stored_alignment.exists(target, source)
+
+
+def test_a_known_alignment_is_not_searched_for_again(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    from mobius_extension.mobius_addon.operators import align
+
+    calls: list[int] = []
+    computed = align.aligned
+    monkeypatch.setattr(align, "aligned", lambda *a, **k: (calls.append(1), computed(*a, **k))[1])
+    choose(*pair)
+    bpy.ops.mobius.conformal_transfer(**QUICK)
+    bpy.ops.mobius.conformal_transfer(**QUICK, mix="add")
+    assert len(calls) == 1
+    pair[1].data.mobius_alignment.target_fingerprint = ""  # as after undo
+    bpy.ops.mobius.conformal_transfer(**QUICK, mix="add")
+    assert len(calls) == 1  # the same was asked
+    pair[1].data.vertices[0].co.z += 0.01
+    bpy.ops.mobius.conformal_transfer(**QUICK)
+    assert len(calls) == 2
+
+
+def test_nothing_is_written_where_there_is_nothing_to_carry(pair: tuple[Any, Any]) -> None:
+    choose(*pair)
+    before = [everything(obj) for obj in pair]
+    with pytest.raises(RuntimeError, match="'Source' has no color attributes to transfer"):
+        bpy.ops.mobius.conformal_transfer(**QUICK, kinds={"COLORS"})
+    assert [everything(obj) for obj in pair] == before
+
+
+def test_the_selection_has_to_be_two_meshes(pair: tuple[Any, Any]) -> None:
+    choose(pair[0])
+    with pytest.raises(RuntimeError, match="Select two meshes, the target last: it is the active one"):
+        bpy.ops.mobius.conformal_transfer()
+    empty = bpy.data.objects.new("Empty", None)
+    bpy.context.scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    choose(empty, pair[1])
+    with pytest.raises(RuntimeError, match="'Empty' is no mesh"):
+        bpy.ops.mobius.conformal_transfer()
+
+
+def test_check_goes_to_edit_mode_on_request() -> None:
+    hole = make_sheet("Hole", 6, keep=lambda i, j: (i, j) != (2, 2))
+    make_sheet("Active", 4)
+    assert bpy.ops.mobius.check(object_name="Hole", edit=True) == {"FINISHED"}
+    assert (bpy.context.object, bpy.context.mode) == (hole, "EDIT_MESH")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.mobius.check(object_name="Active", edit=True) == {"FINISHED"}
+    assert bpy.context.mode == "OBJECT"  # nothing is wrong with it
+
+
 # undo
 
 
@@ -385,6 +453,11 @@ def test_one_undo_takes_back_flatten() -> None:
 def test_one_undo_takes_back_align_on_both_meshes_and_then_transfer_is_refused(pair: tuple[Any, Any]) -> None:
     undone_by_one_step(["Source", "Target"], lambda *how: bpy.ops.mobius.align(*how, **QUICK))
     assert not bpy.ops.mobius.transfer.poll()
+
+
+def test_one_undo_takes_back_alignment_and_transfer_in_one_go(pair: tuple[Any, Any]) -> None:
+    choose(*pair)
+    undone_by_one_step(["Source", "Target"], lambda *how: bpy.ops.mobius.conformal_transfer(*how, **QUICK))
 
 
 def test_one_undo_takes_back_transfer_and_the_alignment_is_still_there(pair: tuple[Any, Any]) -> None:

@@ -54,11 +54,20 @@ def test_a_failing_registration_leaves_nothing_behind(monkeypatch: pytest.Monkey
     assert traces() == before
 
 
-@pytest.mark.parametrize("name", ["check", "flatten", "align", "transfer"])
-def test_everything_that_can_be_set_or_pressed_has_a_tooltip(name: str) -> None:
-    rna = getattr(bpy.ops.mobius, name).get_rna_type()
-    assert rna.description
-    silent = [p.identifier for p in rna.properties if p.identifier != "rna_type" and not p.description]
+def test_everything_that_can_be_set_or_pressed_has_a_tooltip() -> None:
+    names = [name for name in dir(bpy.ops.mobius) if not name.endswith("preset_add")]
+    assert {"swap", "heat_map", "side_by_side", "conformal_transfer", "stop"} <= set(names)
+    owners = [getattr(bpy.ops.mobius, name).get_rna_type() for name in names]
+    for rna in owners:
+        assert rna.description, rna.identifier
+        assert not rna.description.endswith("."), rna.identifier  # Blender sets a full stop itself
+    owners += [x.bl_rna for x in (type(bpy.context.scene.mobius), type(bpy.context.window_manager.mobius_view))]
+    silent = [
+        f"{rna.identifier}.{p.identifier}"
+        for rna in owners
+        for p in rna.properties
+        if p.identifier not in ("rna_type", "name") and not p.description
+    ]
     assert silent == []
 
 

@@ -1,0 +1,260 @@
+"""The panel: what it says of each mesh and of a result, that all it shows exists, presets, and other languages."""
+
+import json
+import string
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import texts
+from scenes import QUICK, make_object, make_sheet
+
+bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
+
+from mobius_extension.mobius_addon import jobs, panel, preset_menus, topology_cache  # noqa: E402
+from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
+from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
+from mobius_extension.solver import Progress  # noqa: E402
+
+
+class Layout:
+    """Notes what is drawn, and fails where Blender would: at what does not exist."""
+
+    def __init__(self, notes: list[str] | None = None) -> None:
+        self.__dict__["notes"] = [] if notes is None else notes
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        assert name in bpy.types.UILayout.bl_rna.properties, name
+
+    def _part(self, *_: Any, **options: Any) -> "Layout":
+        self.notes.append(options.get("heading", ""))
+        return Layout(self.notes)
+
+    row = column = box = split = _part
+
+    def label(self, *, text: str, icon: str = "NONE", translate: bool = True) -> None:
+        assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+        self.notes.append(text)
+
+    def prop(self, owner: Any, name: str, **_: Any) -> None:
+        assert name in owner.bl_rna.properties, name
+        self.notes.append(name)
+
+    def prop_enum(self, owner: Any, name: str, value: str, **_: Any) -> None:
+        assert value in owner.bl_rna.properties[name].enum_items
+        self.notes.append(value)
+
+    def operator(self, name: str, **options: Any) -> Any:
+        rna = getattr(bpy.ops.mobius, name.removeprefix("mobius.")).get_rna_type()
+        assert rna.properties is not None, name
+        self.notes.append(options.get("text") or rna.name)
+
+        class Properties:
+            def __setattr__(self, name: str, value: Any) -> None:
+                assert name in rna.properties, name
+
+        return Properties()
+
+    def progress(self, *, factor: float, text: str) -> None:
+        assert 0 <= factor <= 1
+        self.notes.append(text)
+
+    def popover(self, **_: Any) -> None:
+        pass
+
+    def separator(self, **_: Any) -> None:
+        pass
+
+
+def drawn(cls: Any) -> list[str]:
+    layout = Layout()
+    cls.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout.notes
+
+
+def aligned_report(target: Any) -> dict[str, Any]:
+    return json.loads(target.data.mobius_alignment.report)
+
+
+# under each picker
+
+
+def lines(obj: Any, **repair: bool) -> tuple[str, ...]:
+    return topology_cache.line_of(obj, Repair(**repair)).rows
+
+
+def test_the_line_under_a_picker() -> None:
+    assert lines(make_sheet("Sheet", 9)) == ("disc, 81 vertices",)
+    holes = make_sheet("Holes", 9, keep=lambda i, j: (i, j) not in ((2, 2), (2, 5), (5, 5)))
+    assert lines(holes, fill_holes=True) == ("4 boundary loops:", "3 will be filled")
+    assert lines(holes) == ("3 openings:", "turn on Fill Holes")
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    cube = make_object("Cube", corners, quads)
+    assert lines(cube, fill_holes=True) == ("closed surface:", "cut it first")
+    parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
+    assert lines(parts) == ("2 separate parts:", "keep one, or turn on Largest Part")
+    assert lines(parts, largest_part=True) == ("disc, 28 vertices",)
+
+
+def test_an_edit_changes_the_line() -> None:
+    obj = make_sheet("Sheet", 6)
+    assert lines(obj) == ("disc, 36 vertices",)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert lines(obj) == ("disc, 121 vertices",)
+
+
+# drawing
+
+
+def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
+    panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
+    assert len(panels) == 7
+    for settings in ({"source": None}, {"source": pair[0]}):
+        for name, value in settings.items():
+            setattr(bpy.context.scene.mobius, name, value)
+        for cls in (panel.MOBIUS_PT_main, panel.MOBIUS_PT_transfer, panel.MOBIUS_PT_scans, panel.MOBIUS_PT_alignment):
+            assert drawn(cls)
+    bpy.ops.mobius.align(**QUICK)
+    settings = bpy.context.scene.mobius
+    settings.layers = settings.source_mask = settings.target_mask = "named"
+    bpy.context.window_manager.mobius_view.matches = True
+    for cls in panels:
+        assert drawn(cls)
+    bpy.context.window_manager.mobius_view.matches = False
+
+
+def test_the_result_stands_where_a_pair_is_aligned(pair: tuple[Any, Any]) -> None:
+    assert not panel.MOBIUS_PT_result.poll(bpy.context)
+    bpy.ops.mobius.align(**QUICK)
+    assert panel.MOBIUS_PT_result.poll(bpy.context)
+    said = drawn(panel.MOBIUS_PT_result)
+    found = aligned_report(pair[1])
+    for text in ("Certified: none matches more", f"{found['value']:.2f}", f"{found['matches']} of 12", "not mirrored"):
+        assert text in said
+    pair[1].data.mobius_alignment.report = "{"
+    assert drawn(panel.MOBIUS_PT_result) == ["Damaged: press Align again"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "offered"),
+    [
+        ({"orientation_margin": 0.01}, ["Take Mirrored"]),
+        ({"orientation_margin": -0.01}, ["Take Mirrored"]),
+        ({"orientation_margin": 0.2, "rival_margin": 0.03}, ["Take the Rival"]),
+        ({"orientation_margin": 0.2, "rival_margin": 0.2}, []),
+        ({"orientation_margin": None, "rival_margin": None, "certified": False, "gap": 1.5}, []),
+    ],
+)
+def test_where_the_surfaces_do_not_decide_the_other_choice_is_offered(
+    pair: tuple[Any, Any], changes: dict[str, Any], offered: list[str]
+) -> None:
+    bpy.ops.mobius.align(**QUICK)
+    pair[1].data.mobius_alignment.report = json.dumps(aligned_report(pair[1]) | changes)
+    said = drawn(panel.MOBIUS_PT_result)
+    assert [text for text in said if text.startswith("Take")] == offered
+    assert ("Not certified: gap 1.50" in said) == (changes.get("certified") is False)
+
+
+def test_the_rival_can_be_taken(pair: tuple[Any, Any]) -> None:
+    bpy.ops.mobius.align(**QUICK)
+    best = aligned_report(pair[1])
+    bpy.ops.mobius.align(**QUICK, take_rival=True)
+    rival = aligned_report(pair[1])
+    assert rival["settings"]["take_rival"] is True
+    assert rival["mobius"] == best["rival"]["mobius"] != best["mobius"]
+
+
+def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    said = drawn(panel.MOBIUS_PT_main)
+    assert "Align" in said
+    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7))
+    monkeypatch.setattr(jobs.Job, "current", under_way)
+    said = drawn(panel.MOBIUS_PT_main)
+    assert "Align" not in said
+    assert {"Searching", "30.0 matched of at most 40.0", "Stop"} <= set(said)
+    for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer):
+        assert not operator.poll()
+    with pytest.raises(RuntimeError, match="Align is under way: press ESC to stop it"):
+        bpy.ops.mobius.align()
+
+
+# swap
+
+
+def test_swap_exchanges_and_one_undo_takes_it_back(pair: tuple[Any, Any]) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.mobius.swap("EXEC_DEFAULT", True) == {"FINISHED"}
+    settings = bpy.context.scene.mobius
+    assert (settings.source.name, settings.target.name) == ("Target", "Source")
+    bpy.ops.ed.undo()
+    settings = bpy.context.scene.mobius
+    assert (settings.source.name, settings.target.name) == ("Source", "Target")
+    settings.source = settings.target = None
+    with pytest.raises(RuntimeError, match="Choose a source or target mesh first"):
+        bpy.ops.mobius.swap()
+
+
+# presets
+
+
+@pytest.fixture(autouse=True)
+def preset_labels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender writes the name of the last preset into the menu's label."""
+    for menu in (preset_menus.MOBIUS_PT_align_presets, preset_menus.MOBIUS_PT_transfer_presets):
+        monkeypatch.setattr(menu, "bl_label", menu.bl_label)
+
+
+@pytest.mark.parametrize("name", ["standard", "draft", "thorough", "mirror_image"])
+def test_presets_that_come_along(name: str) -> None:
+    path = bpy.utils.preset_find(name, "mobius/align")
+    assert path is not None
+    settings = bpy.context.scene.mobius
+    settings.samples = 77
+    bpy.ops.script.execute_preset(filepath=path, menu_idname="MOBIUS_PT_align_presets")
+    written = {
+        line.split(" = ")[0]
+        for line in Path(path).read_text(encoding="utf-8").splitlines()
+        if line.startswith("settings.")
+    }
+    assert written == set(preset_menus.MOBIUS_OT_align_preset_add.preset_values)
+    assert settings.samples == {"standard": 100, "draft": 60, "thorough": 200, "mirror_image": 100}[name]
+
+
+@pytest.mark.parametrize("kind", ["align", "transfer"])
+def test_presets_are_kept_in_blenders_folder(kind: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "presets" / "mobius" / kind
+    folder.mkdir(parents=True)
+    monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, **__: str(folder))
+    bpy.context.scene.mobius.samples = 55
+    bpy.context.scene.mobius.mix = "add"
+    add = getattr(bpy.ops.mobius, f"{kind}_preset_add")
+    assert add(name="Mine") == {"FINISHED"}
+    text = (folder / "Mine.py").read_text()
+    assert ("settings.samples = 55" in text) == (kind == "align")
+    assert ("settings.mix = 'add'" in text) == (kind == "transfer")
+    settings = bpy.context.scene.mobius
+    settings.samples, settings.mix = 100, "replace"
+    exec(compile(text, "Mine.py", "exec"), {})
+    assert (settings.samples, settings.mix) == ((55, "replace") if kind == "align" else (100, "add"))
+
+
+# languages
+
+
+def fields(text: str) -> list[tuple[str | None, str | None]]:
+    return [(name, spec) for _, name, spec, _ in string.Formatter().parse(text) if name is not None]
+
+
+def test_german_covers_the_interface() -> None:
+    # the Python module is built without languages: the window's test shows the panel in German
+    blenders_own = {"Add Alignment Preset", "Add Transfer Preset"}
+    missing = (texts.of_classes() | texts.of_code()) - set(GERMAN) - blenders_own
+    assert sorted(text for text in missing if not text.startswith("Keep the")) == []
+    for english, german in GERMAN.items():
+        assert fields(english) == fields(german), english
+        assert english.endswith(":") == german.endswith(":"), english

@@ -1,0 +1,64 @@
+"""Every English text of the interface: from the registered classes, and from the calls that draw and report."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TRANSLATED = {"iface_", "rpt_", "n_"}
+
+
+def of_classes() -> set[str]:
+    """Labels and tooltips of our operators, panels and properties, as Blender knows them."""
+    import bpy
+
+    found: set[str] = set()
+    owners = [
+        getattr(bpy.ops.mobius, name).get_rna_type() for name in dir(bpy.ops.mobius) if not name.endswith("preset_add")
+    ]
+    for rna in owners:
+        found |= {rna.name, rna.description}
+    for owner, name in ((bpy.types.Scene, "mobius"), (bpy.types.WindowManager, "mobius_view")):
+        owners.append(owner.bl_rna.properties[name].fixed_type)
+    for rna in owners:
+        for prop in rna.properties:
+            if prop.identifier not in ("rna_type", "name"):
+                found |= {prop.name, prop.description}
+                found |= {text for item in getattr(prop, "enum_items", ()) for text in (item.name, item.description)}
+    found |= {getattr(bpy.types, name).bl_label for name in dir(bpy.types) if name.startswith("MOBIUS_PT_")}
+    return found - {""}
+
+
+def of_code() -> set[str]:
+    """Texts in calls that translate, in `text=` and `heading=` of layouts, and the stages that the solver tells."""
+    found: set[str] = set()
+    for path in sorted((ROOT / "mobius_addon").glob("**/*.py")):
+        if "demo" not in path.parts and path.name != "german.py":
+            for call in _calls(path):
+                name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
+                if name in TRANSLATED:
+                    found |= set(_constants(call.args[0]))
+                elif name in ("label", "prop", "operator", "column") and "layout" not in path.stem:
+                    for keyword in call.keywords:
+                        if keyword.arg in ("text", "heading"):
+                            found |= set(_constants(keyword.value))
+    for call in _calls(ROOT / "solver" / "align.py"):
+        if getattr(call.func, "attr", "") == "begin":
+            found |= set(_constants(call.args[1]))
+    return {text for text in found if text.strip()}
+
+
+def _calls(path: Path) -> Iterator[ast.Call]:
+    return (x for x in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(x, ast.Call))
+
+
+def _constants(node: ast.AST) -> Iterator[str]:
+    """Texts that an argument can be: itself, or either branch of a condition."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.IfExp):
+        yield from _constants(node.body)
+        yield from _constants(node.orelse)
+    elif isinstance(node, ast.BoolOp):
+        for value in node.values:
+            yield from _constants(value)
