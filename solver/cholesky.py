@@ -9,15 +9,21 @@ matrix, so that nearly all of the work is done by BLAS.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
+from scipy.linalg import get_blas_funcs, get_lapack_funcs
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 
 from .mesh import Floats, Integers
+
+try:
+    import threadpoolctl
+except ImportError:  # the same to the last digits, and twice as slow
+    threadpoolctl = None
 
 LARGE = 80_000
 """Unknowns from which nested dissection is faster than SuperLU: at 48,000 it takes 1.3 times as long, at 194,000 a
@@ -64,17 +70,24 @@ def nested_dissection_cholesky(matrix: csc_array) -> Callable[[Floats], Floats]:
     key = ((((part + 1) << below) - 1) << 6) + below
     order = np.argsort(key, kind="stable")
     bounds = np.flatnonzero(np.diff(key[order], prepend=-1))
-    permuted = csc_array(csc_array(matrix[order])[:, order])
-    fronts = _eliminated(permuted, part[order[bounds]], np.append(bounds, n))
+    place = np.empty(n, np.int32)
+    place[order] = np.arange(n)
+    entries = matrix.tocoo()
+    row, column = place[entries.row], place[entries.col]
+    lower = row >= column
+    permuted = csc_array((entries.data[lower], (row[lower], column[lower])), shape=(n, n))
+    with _one_thread():
+        fronts = _eliminated(permuted, part[order[bounds]], np.append(bounds, n))
 
     def solve(right: Floats) -> Floats:
         x = right[order].reshape(n, -1)
-        for front in fronts:
-            x[front.start : front.stop] = y = front.inverse @ x[front.start : front.stop]
-            x[front.rows] -= front.below @ y
-        for front in reversed(fronts):
-            own = x[front.start : front.stop] - front.below.T @ x[front.rows]
-            x[front.start : front.stop] = front.inverse.T @ own
+        with _one_thread():
+            for front in fronts:
+                x[front.start : front.stop] = y = front.inverse @ x[front.start : front.stop]
+                x[front.rows] -= front.below @ y
+            for front in reversed(fronts):
+                own = x[front.start : front.stop] - front.below.T @ x[front.rows]
+                x[front.start : front.stop] = front.inverse.T @ own
         result = np.empty_like(x)
         result[order] = x
         return result.reshape(right.shape)
@@ -109,7 +122,7 @@ def nested_dissection(graph: csr_array, leaf: int = LEAF) -> Integers:
         here = coordinates[:, member]
         width = np.maximum.reduceat(here, starts, axis=1) - np.minimum.reduceat(here, starts, axis=1)
         along = here[np.argmax(width, axis=0)[of_member], np.arange(len(member))]
-        member = member[np.lexsort((along, of_member))]
+        member = member[np.argsort(along + 2 * len(part) * of_member)]  # by group, then along
         right = np.arange(len(member)) - starts[of_member] >= sizes[of_member] // 2
         side = 2 * part
         side[member] += right
@@ -136,50 +149,68 @@ def _hops(graph: csr_array, start: int) -> Floats:
     """Return the distance in edges of each vertex from one, (n,); n where there is no way."""
     n = graph.indptr.size - 1
     order, before = breadth_first_order(graph, start, directed=False)
+    place = np.empty(n, np.intp)
+    place[order] = np.arange(len(order))
+    parent = place[before[order[1:]]]  # ascending: a hop ends where the parents are those that the last one found
+    ends = [0, 1]
+    while ends[-1] < len(order):
+        ends.append(1 + int(np.searchsorted(parent, ends[-1])))
     hops = np.full(n, float(n))
-    hops[order] = 1
-    hops[start] = 0
-    before = np.where(before < 0, np.arange(n), before)
-    # each round doubles the length of the way back that is counted
-    while (before[before] != before).any():
-        hops += hops[before]
-        before = before[before]
-    return np.minimum(hops, n)
+    hops[order] = np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+    return hops
+
+
+def _one_thread() -> AbstractContextManager[object]:
+    """Keep BLAS to one thread: on thousands of small blocks more of them mostly wait for each other."""
+    return nullcontext() if threadpoolctl is None else threadpoolctl.threadpool_limits(1, "blas")
 
 
 def _eliminated(matrix: csc_array, parts: Integers, bounds: Integers) -> list[_Front]:
-    """Factorise the permuted matrix, part after part."""
+    """Factorise the permuted matrix, of which the lower triangle is given, part after part."""
     starts, indices, data = matrix.indptr, matrix.indices.astype(np.intp), matrix.data
-    place = np.empty(len(starts) - 1, np.intp)
+    place, work = np.empty(len(starts) - 1, np.intp), np.empty((3, 0))
     waiting: dict[int, list[tuple[Integers, Floats]]] = {p: [] for p in parts.tolist()}
     fronts: list[_Front] = []
+    # all from scipy: numpy brings another BLAS, and the idle threads of the one would spin on the other's cores
     potrf, trtri = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
+    trmm, syrk = get_blas_funcs(("trmm", "syrk"), dtype=np.float64)
     for p, start, stop in zip(parts.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         span = slice(starts[start], starts[stop])
         row, value = indices[span], data[span]
         column = np.repeat(np.arange(stop - start), np.diff(starts[start : stop + 1]))
-        kept = row >= start
-        row, value, column = row[kept], value[kept], column[kept]
         children = waiting.pop(p)
         reached = np.concatenate([row, *(rows for rows, _ in children)])
-        rows = np.unique(reached[reached >= stop])
+        reached = reached[reached >= stop]
+        place[reached] = np.arange(len(reached))
+        rows = np.sort(reached[place[reached] == np.arange(len(reached))])  # each once
         k = stop - start
         place[start:stop] = np.arange(k)
         place[rows] = k + np.arange(len(rows))
-        front = np.zeros((k + len(rows), k + len(rows)))
-        front[place[row], column] = value
-        for child_rows, update in children:
+        size = k + len(rows)
+        if size**2 > work.shape[1]:
+            work = np.empty((3, 2 * size**2))  # memory that is there already: fresh pages cost more than the sums
+        front = work[0, : size**2].reshape(size, size).T  # its lower triangle counts
+        front[:] = 0
+        for nth, (child_rows, update) in enumerate(children):
             at = place[child_rows]
-            front[at[:, None], at] += update
+            spread, sums = (w[: len(at) * size].reshape(len(at), size) for w in work[1:])
+            spread[:] = 0
+            spread[:, at] = update.T
+            if nth:
+                np.take(front.T, at, axis=0, out=sums, mode="clip")
+                spread += sums
+            front.T[at] = spread  # row by row: element by element takes five times as long
+        front[place[row], column] += value.astype(np.float64, copy=False)
         factor, failed = potrf(front[:k, :k], lower=1, clean=1)
         if failed:
             raise ValueError("the matrix is not positive definite")
         inverse, _ = trtri(factor, lower=1)
-        below = front[k:, :k] @ inverse.T
+        below = front[k:, :k]
         if len(rows):
+            below = trmm(1.0, inverse, below, side=1, lower=1, trans_a=1)
             parent = p // 2
             while parent not in waiting:  # a part whose inside has no edge across needs no separator
                 parent //= 2
-            waiting[parent].append((rows, front[k:, k:] - below @ below.T))
+            waiting[parent].append((rows, syrk(-1.0, below, 1.0, front[k:, k:], lower=1)))
         fronts.append(_Front(start, stop, rows, inverse, below))
     return fronts

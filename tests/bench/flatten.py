@@ -2,19 +2,22 @@
 
     python tests/bench/flatten.py [--data DIR] [--large] [--factorisations]
 
---large adds the brain with every edge cut in two, and that again: 0.4 and 1.5 million triangles. --factorisations
-compares solvers of the brain's Laplacian. libigl, pyamg, qdldl and cholespy are optional (pip); what is absent is left
-out. Times are CPU seconds of one thread (set OMP_NUM_THREADS=1); "x bare" is the time over the bare SuperLU
-factorisation of the same Laplacian.
+--large adds the brain with every edge cut in two (0.4 million triangles), then the longest edges of that again up to a
+million, then all of them (1.5 million). --factorisations compares solvers of the brain's Laplacian. libigl, pyamg,
+qdldl and cholespy are optional (pip); what is absent is left out. Times are CPU seconds of one thread; "x bare" is the
+time over the bare SuperLU factorisation of the same Laplacian.
 """
 
 import argparse
 import importlib
+import os
 import resource
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy reads it
 
 import numpy as np
 
@@ -50,12 +53,30 @@ def fresh(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(mesh.vertices, mesh.faces, mesh.name)
 
 
-def finer(mesh: TriangleMesh) -> TriangleMesh:
-    """Cut every edge in two and every face in four."""
-    n, (a, b, c) = len(mesh.vertices), mesh.faces.T
-    x, y, z = (n + mesh.edge_of_side.reshape(-1, 3)).T
-    faces = np.concatenate([np.stack(face, axis=1) for face in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))])
-    return TriangleMesh(np.concatenate([mesh.vertices, mesh.vertices[mesh.edges].mean(axis=1)]), faces, mesh.name)
+def finer(mesh: TriangleMesh, faces: int) -> TriangleMesh:
+    """Cut the longest edges in two, as many as it takes to about so many faces; at most all: four times as many."""
+    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    share = np.bincount(mesh.edge_of_side)[np.argsort(-lengths)].cumsum()  # a face for each side that is cut
+    cut = np.argsort(-lengths)[: np.searchsorted(share, faces - len(mesh.faces), side="right")]
+    middle = np.full(len(mesh.edges), -1)
+    middle[cut] = len(mesh.vertices) + np.arange(len(cut))
+    vertices = np.concatenate([mesh.vertices, mesh.vertices[mesh.edges[cut]].mean(axis=1)])
+    corners, middles = mesh.faces, middle[mesh.edge_of_side].reshape(-1, 3)
+    cuts = (middles >= 0).sum(axis=1)
+    # the odd side first: the cut one of one, the whole one of two
+    first = np.argmax((middles >= 0) == (cuts == 1)[:, None], axis=1)
+    turn = (first[:, None] + np.arange(3)) % 3
+    (a, b, c), (x, y, z) = (np.take_along_axis(table, turn, axis=1).T for table in (corners, middles))
+    across = np.linalg.norm(vertices[b] - vertices[y], axis=1) < np.linalg.norm(vertices[c] - vertices[z], axis=1)
+    cases = (
+        (cuts == 0, [(a, b, c)]),
+        (cuts == 1, [(a, b, x), (a, x, c)]),
+        ((cuts == 2) & across, [(a, z, y), (z, b, y), (b, c, y)]),
+        ((cuts == 2) & ~across, [(a, z, y), (z, b, c), (z, c, y)]),
+        (cuts == 3, [(a, z, y), (z, b, x), (y, x, c), (x, y, z)]),
+    )
+    pieces = [np.stack(piece, axis=1)[case] for case, several in cases for piece in several]
+    return TriangleMesh(vertices, np.concatenate(pieces), mesh.name)
 
 
 def dirichlet_matrix(mesh: TriangleMesh) -> csc_array:
@@ -115,11 +136,13 @@ def compare(mesh: TriangleMesh, rounds: int) -> None:
 
 
 def compare_sizes(mesh: TriangleMesh) -> None:
-    """Time and memory as triangles grow fourfold."""
+    """Time and memory as triangles grow, to a million and beyond."""
+    n = len(mesh.faces)
     print("\nfaces        seconds   x first   peak memory, GB   angle error   flips")
-    first = 0.0
-    for _ in range(3):
-        cpu, result = seconds(lambda mesh=mesh: flatten(fresh(mesh)))
+    first, fine = 0.0, finer(mesh, 4 * n)
+    for faces in (n, 4 * n, 1_000_000, 16 * n):
+        mesh = {n: mesh, 4 * n: fine}.get(faces) or finer(fine, faces)
+        cpu, result = seconds(lambda mesh=mesh: flatten(fresh(mesh)), 2)
         first = first or cpu
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         found = result.distortion
@@ -128,7 +151,6 @@ def compare_sizes(mesh: TriangleMesh) -> None:
             f"{found.flips:7d}",
             flush=True,
         )
-        mesh = finer(mesh)
 
 
 def compare_factorisations(mesh: TriangleMesh) -> None:
@@ -145,7 +167,7 @@ def compare_factorisations(mesh: TriangleMesh) -> None:
             again, x = seconds(lambda solve=solve, right=right: solve(right))
             residual = np.abs(matrix @ x - right).max()
             print(f"{matrix.shape[0]:8,}  {name:24} {cpu:7.2f} {again:12.3f} {residual:10.0e}", flush=True)
-        mesh = finer(mesh)
+        mesh = finer(mesh, 4 * len(mesh.faces))
 
 
 def solvers() -> dict[str, Callable[[csc_array], Callable[[np.ndarray], np.ndarray]]]:
