@@ -186,7 +186,8 @@ class _Search:
         # long search does not spend its time here
         most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
-            while self.upper_bound > max(self.value, self.finished_bound):
+            # cells that ended undecided may turn out worthless: another may yet reach their bound
+            while any(map(len, self.frontier)):
                 now = time.perf_counter()
                 if time_limit is not None and now - started > time_limit:
                     break

@@ -16,7 +16,7 @@ from ..matching import Matching
 from ..mesh import Complexes, Floats
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 4
+INTERFACE = 5
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
@@ -25,8 +25,14 @@ ARENA = 1 << 20
 NEAR = 1 / 16
 """Turns that rotations near a given one spread over."""
 
-RINGS, SECTORS = 128, 64
-"""Of the grid of target points, as in kernels.c."""
+MOST_RINGS = 128
+"""Of the grid of target points: no more than the coarsest raster has."""
+
+ANGLES, MOST_LEVELS, SHARPNESS = 512, 4, 0.15
+"""Of the raster, as in kernels.c."""
+
+COARSE = 4.0
+"""Half side of the smallest cells that the raster is used for, over the length of its finest stretch."""
 
 STACK = 2048
 """Open cells of one subtree at most, as in kernels.c."""
@@ -39,7 +45,13 @@ class _Problem(ctypes.Structure):
     _fields_ = [
         ("points", _I64),
         *((name, _POINTER) for name in ("mx", "my", "start", "stop", "pairs", "inner", "reach", "weight", "raster")),
+        ("levels", _I64),
+        ("planes", _I64),
+        ("density", _F64),
+        ("typical", _F64),
+        ("coarse", _F64),
         *((name, _POINTER) for name in ("grid", "nearest_ring", "farthest_ring", "ring_wide")),
+        ("rings", _I64),
         ("z_max", _F64),
         ("smallest", _F64),
     ]
@@ -71,6 +83,7 @@ def opened(path: Path) -> ctypes.CDLL:
     loaded.mobius_bounds.restype = None
     loaded.mobius_bounds.argtypes = [_POINTER, _POINTER, _I64, ctypes.c_int32, _POINTER, _I64]
     loaded.mobius_raster_bytes.restype = _I64
+    loaded.mobius_raster_bytes.argtypes = [_I64]
     loaded.mobius_raster.restype = None
     loaded.mobius_raster.argtypes = [_POINTER]
     loaded.mobius_rotations.restype = None
@@ -95,7 +108,9 @@ class CompiledKernels:
         self._library = loaded
         self.unit = problem.unit
         self.points = len(problem.source)
-        order, start, stop, shared = _rows(problem)
+        # about one target point in two of its sectors
+        rings = int(np.clip(2 ** np.round(0.5 * np.log2(max(len(problem.point) // self.points, 1))), 8, MOST_RINGS))
+        order, start, stop, shared = _rows(problem, rings)
         inner, outer = (x[order] for x in reaches(problem))
         tangent, wide = (x[order] for x in tangents(problem))
         # the running maximum along each row: pairs before its first entry >= near cannot reach near
@@ -116,13 +131,26 @@ class CompiledKernels:
             "reach": reach,
             "weight": None if problem.unit == 1 else np.round(problem.weight[order] / problem.unit).astype(np.uint32),
         }
+        typical = float(np.median(widest)) if len(widest) else 1.0
+        levels = int(np.clip(np.ceil(np.log2(1 / (SHARPNESS * typical * ANGLES))) + 1, 1, MOST_LEVELS))
         if shared:
-            arrays["raster"] = np.empty(loaded.mobius_raster_bytes() // 8, np.uint64)
-            arrays |= _grid(b, turn, inner, outer, widest)
+            arrays["raster"] = np.empty(loaded.mobius_raster_bytes(levels) // 8, np.uint64)
+            arrays |= _grid(b, turn, inner, outer, widest, rings)
         # kept, because the structure holds bare addresses
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
-        self._problem = _Problem(points=self.points, z_max=z_max, smallest=smallest, **addresses)
+        self._problem = _Problem(
+            points=self.points,
+            planes=max(3, self.points.bit_length()),
+            levels=levels,
+            typical=typical,
+            coarse=COARSE / (ANGLES << levels),
+            density=4.0 * len(widest),
+            rings=rings,
+            z_max=z_max,
+            smallest=smallest,
+            **addresses,
+        )
         self._local = threading.local()
         if shared:
             loaded.mobius_raster(ctypes.addressof(self._problem))
@@ -202,7 +230,7 @@ class CompiledKernels:
         return left, spent
 
 
-def _rows(problem: Matching) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+def _rows(problem: Matching, rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Return an order of pairs, where in it each source point's row starts and stops, and whether it is one for all.
 
     If every source point may match every target point, all of them share one row, sorted by the sectors of the grid;
@@ -214,31 +242,31 @@ def _rows(problem: Matching) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         targets = problem.target.reshape(count, width)
         if (problem.point.reshape(count, width) == np.arange(count)[:, None]).all() and (targets == targets[0]).all():
             centre = problem.centre[:width]
-            order = np.argsort(_sector(np.abs(centre), np.angle(centre) / (2 * np.pi)), kind="stable")
+            order = np.argsort(_sector(np.abs(centre), np.angle(centre) / (2 * np.pi), rings), kind="stable")
             return order, np.zeros(count, np.int64), np.full(count, width, np.int64), True
     order = np.lexsort([reaches(problem)[0], problem.point])
     bounds = np.searchsorted(problem.point, np.arange(count + 1)).astype(np.int64)
     return order, bounds[:-1].copy(), bounds[1:].copy(), False
 
 
-def _sector(b: Floats, turn: Floats) -> np.ndarray:
+def _sector(b: Floats, turn: Floats, rings: int) -> np.ndarray:
     """Return the number of the sector of the grid that each target point lies in, ring by ring."""
-    ring = np.minimum((b * RINGS).astype(np.int64), RINGS - 1)
-    return ring * SECTORS + np.minimum(((turn - np.floor(turn)) * SECTORS).astype(np.int64), SECTORS - 1)
+    ring, sectors = np.minimum((b * rings).astype(np.int64), rings - 1), 2 * rings
+    return ring * sectors + np.minimum(((turn - np.floor(turn)) * sectors).astype(np.int64), sectors - 1)
 
 
-def _grid(b: Floats, turn: Floats, inner: Floats, outer: Floats, widest: Floats) -> dict[str, np.ndarray]:
+def _grid(b: Floats, turn: Floats, inner: Floats, outer: Floats, widest: Floats, rings: int) -> dict[str, np.ndarray]:
     """Return where each sector's target points begin, and what rings of the grid a ring of images has to look at."""
-    sector = _sector(b, turn)
-    ring = sector // SECTORS
-    wide = np.zeros(RINGS)
+    sector = _sector(b, turn, rings)
+    ring = sector // (2 * rings)
+    wide = np.zeros(rings)
     np.maximum.at(wide, ring, widest)
     # of the discs that reach out to a ring or beyond the innermost, of those that reach into it or below the outermost
-    nearest, farthest = np.full(RINGS, RINGS, np.int64), np.full(RINGS, -1, np.int64)
-    np.minimum.at(nearest, np.clip(np.floor(outer * RINGS), 0, RINGS - 1).astype(np.int64), ring)
-    np.maximum.at(farthest, np.clip(np.floor(inner * RINGS), 0, RINGS - 1).astype(np.int64), ring)
+    nearest, farthest = np.full(rings, rings, np.int64), np.full(rings, -1, np.int64)
+    np.minimum.at(nearest, np.clip(np.floor(outer * rings), 0, rings - 1).astype(np.int64), ring)
+    np.maximum.at(farthest, np.clip(np.floor(inner * rings), 0, rings - 1).astype(np.int64), ring)
     return {
-        "grid": np.searchsorted(sector, np.arange(RINGS * SECTORS + 1)).astype(np.int64),
+        "grid": np.searchsorted(sector, np.arange(2 * rings**2 + 1)).astype(np.int64),
         "nearest_ring": np.minimum.accumulate(nearest[::-1])[::-1],
         "farthest_ring": np.maximum.accumulate(farthest),
         "ring_wide": wide,

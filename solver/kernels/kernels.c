@@ -8,7 +8,8 @@
    rounded outward to whole stretches, and counts how much each stretch can hold: one bit per stretch and source point
    and carry-save counters if all weights are 1, one 32-bit number per stretch otherwise. Stretches that hold no more
    than the value in hand are dead in every smaller cell too, so the children of a cell look only at the window of
-   rotations that is left, in finer stretches, and only at the pairs that reach into it.
+   rotations that is left, in finer stretches: at a finer level of the raster first, then only at the pairs that reach
+   into it.
 
    Angles are in turns (1 is the full circle). No operation may be contracted or reassociated: -ffp-contract=off, no
    -ffast-math; then the result is the same on every machine. Rounding: every computed quantity below is off by less
@@ -23,31 +24,34 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 4
+#define INTERFACE 5
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
 #define PLANES 16      /* fewer than 2^16 source points */
+#define RASTER_GAP 256 /* stretches */
+#define FEW_PAIRS 0.25
+#define ALIKE 4        /* stretches that a good rotation may be off */
+#define LOOKS 16       /* at the rotations of one z */
+#define SHARP 0x1p-26  /* turns */
 #define STACK 2048     /* open cells of one subtree */
 #define CLUSTERS 8     /* windows that the rotations left in one cell are cut into */
 #define FULL 0.75      /* a window wider than this is the full circle */
 
-/* The raster: where the match discs lie, in RINGS rings of the disc and FINE angles, for source points that may all
-   match the same discs. Four fine angles make one stretch; a row holds every fourth angle, so that the stretches of any
-   offset are one row from some bit on (twice the circle, one word to spare). Row (p, q, ring, phase): the rings
-   ring .. ring + 2^p - 1, any of the angles 4 t + phase .. 4 t + phase + 2^q - 1. */
-#define RINGS 512
-#define FINE 2048
-#define PHASES (FINE / BINS)
-#define SPANS 7
-#define SPREADS 10     /* those below FIRST_SPREAD are not needed: a stretch alone takes five fine angles */
-#define FIRST_SPREAD 2
-#define ROW_WORDS (2 * WORDS + 1)
-#define NARROW 0x1p-13 /* half side times width of cells and windows that are bounded by their pairs after the raster */
-#define GRID_RINGS 128
-#define GRID_SECTORS 64
+/* The raster: where the match discs lie, in rings of the disc and stretches of angles, for source points that may all
+   match the same discs; at several levels, each with twice the angles of the one before. Bit t of row (level, p, q, ring):
+   whether a disc touches one of the rings ring .. ring + 2^p - 1 in one of the stretches t .. t + 2^q - 1. So what the
+   stretches of a window can match is one row from some bit on, or the union of four. A row goes round the circle once, and
+   on for as long as the longest window. */
+#define ANGLES 512     /* of the coarsest level */
+#define MOST_LEVELS 5
+#define LEAST_RINGS 128
+#define SPANS 5
+#define FIRST_SPREAD 1 /* a stretch alone touches two */
+#define LAST_SPREAD 6
+#define MOST_WORDS 32  /* a wider window is looked at on a coarser level */
+#define SHARPNESS 0.15 /* length of a stretch, in half-widths of arcs */
 #define STEADY 0x1p-6  /* half side of cells that take over the common rotation of the cell around them */
-#define COARSE 0x1p-10  /* cells with a smaller half side than this see less in the raster than in lists */
 
 static const double SLACK = 0x1p-42;
 static const double TURN = 0x1.921fb54442d18p+2; /* radians */
@@ -68,9 +72,12 @@ typedef struct {
     const double *inner, *reach; /* of the pairs, and the running maximum of outer along each row */
     const uint32_t *weight; /* NULL: all 1 */
     uint64_t *raster;       /* NULL: rows differ, or weights do; then grid is NULL too */
+    int64_t levels, planes; /* of the raster; of the counters */
+    double density, typical, coarse; /* discs to see at once; half-width of a typical one in turns; smallest half side of cells to use the raster for */
     const int64_t *grid;    /* the one row sorted by ring and sector of b: where each sector begins */
     const int64_t *nearest_ring, *farthest_ring; /* rings of the grid that hold all discs reaching out of and into a ring */
     const double *ring_wide; /* the largest `widest` in a ring of the grid */
+    int64_t rings;          /* of the grid, a power of 2 below LEAST_RINGS; each has twice as many sectors */
     double z_max, smallest;
 } Problem;
 
@@ -82,15 +89,7 @@ typedef struct {
 } Node;
 
 typedef struct { uint32_t point, pair; } Entry;
-typedef uint64_t Mask __attribute__((vector_size(8 * WORDS)));
-typedef union { Mask all; uint64_t word[WORDS]; } Bits;
-
-typedef struct {
-    double *mx, *my, *alpha, *delta, *near, *far, *dx, *dy; /* (N1,) each */
-    uint32_t *active;       /* (N1,) */
-    Entry *arena;
-    int64_t room;
-} Work;
+typedef uint64_t Quad __attribute__((vector_size(32)));
 
 typedef struct {
     uint32_t bound;
@@ -247,157 +246,204 @@ static inline void paint_heavy(Row *into, int low, int high, uint32_t weight) {
     for (int i = low; i <= high; i++) row[i] = row[i] > weight ? row[i] : weight;
 }
 
-static inline int any(Mask m) {
-    Bits b; b.all = m; uint64_t x = 0;
-    for (int i = 0; i < WORDS; i++) x |= b.word[i];
-    return x != 0;
-}
+static inline Quad quad_at(const uint64_t *word) { Quad q; __builtin_memcpy(&q, word, sizeof q); return q; }
+static inline int any(Quad q) { return (q[0] | q[1] | q[2] | q[3]) != 0; }
 
-#define ADD3(carry, sum, a, b, c) do { Mask u_ = (a) ^ (b), v_ = (c); carry = ((a) & (b)) | (u_ & v_); sum = u_ ^ v_; } while (0)
-
+/* One bit of each stretch's count after another, the lowest first. */
 typedef struct {
-    Mask plane[PLANES];     /* bit i of each stretch's count */
-    Bits pending[8];
-    int waiting;
+    uint64_t plane[PLANES][MOST_WORDS];
+    int words, planes;
 } Counter;
 
-static void counter_flush(Counter *c) {
-    Mask zero = {0};
-    for (int i = c->waiting; i < 8; i++) c->pending[i].all = zero;
-    Mask a, b, d, e, twos_a, twos_b, fours_a, fours_b, carry;
-    ADD3(twos_a, c->plane[0], c->plane[0], c->pending[0].all, c->pending[1].all);
-    ADD3(twos_b, c->plane[0], c->plane[0], c->pending[2].all, c->pending[3].all);
-    ADD3(fours_a, c->plane[1], c->plane[1], twos_a, twos_b);
-    ADD3(a, c->plane[0], c->plane[0], c->pending[4].all, c->pending[5].all);
-    ADD3(b, c->plane[0], c->plane[0], c->pending[6].all, c->pending[7].all);
-    ADD3(fours_b, c->plane[1], c->plane[1], a, b);
-    ADD3(carry, c->plane[2], c->plane[2], fours_a, fours_b);
-    for (int i = 3; i < PLANES; i++) {
-        d = c->plane[i] & carry;
-        e = c->plane[i] ^ carry;
-        c->plane[i] = e;
-        carry = d;
-        if (!any(carry)) break;
-    }
-    c->waiting = 0;
+static void counter_clear(Counter *c, int words, int planes) {
+    c->words = words; c->planes = planes;
+    for (int i = 0; i < planes; i++) for (int k = 0; k < words; k++) c->plane[i][k] = 0;
 }
 
-/* The stretches that hold more than `value`, and the largest count among `among`. */
-static Mask counter_above(const Counter *c, int64_t value) {
-    Mask zero = {0}, above = zero, equal = ~zero;
-    if (value < 0) return equal;
-    if (value >= (int64_t)1 << PLANES) return zero;
-    for (int i = PLANES - 1; i >= 0; i--) {
-        if (value >> i & 1) equal &= c->plane[i];
-        else { above |= equal & c->plane[i]; equal &= ~c->plane[i]; }
+typedef struct {
+    double *mx, *my, *alpha, *delta, *near, *far, *dx, *dy; /* (N1,) each */
+    uint32_t *active;       /* (N1,) */
+    Entry *arena;
+    int64_t room;
+    Counter counter;
+    uint64_t own[8][MOST_WORDS + 4];
+} Work;
+
+#define ADD3(carry, sum, a, b, c) do { Quad u_ = (a) ^ (b), v_ = (c); carry = ((a) & (b)) | (u_ & v_); sum = u_ ^ v_; } while (0)
+
+/* Count eight masks in the four words from `at` on. */
+static inline void counter_add(Counter *c, int at, const Quad mask[8]) {
+    Quad ones = quad_at(c->plane[0] + at), twos = quad_at(c->plane[1] + at), fours = quad_at(c->plane[2] + at);
+    Quad a, b, twos_a, twos_b, fours_a, fours_b, carry;
+    ADD3(twos_a, ones, ones, mask[0], mask[1]);
+    ADD3(twos_b, ones, ones, mask[2], mask[3]);
+    ADD3(fours_a, twos, twos, twos_a, twos_b);
+    ADD3(a, ones, ones, mask[4], mask[5]);
+    ADD3(b, ones, ones, mask[6], mask[7]);
+    ADD3(fours_b, twos, twos, a, b);
+    ADD3(carry, fours, fours, fours_a, fours_b);
+    __builtin_memcpy(c->plane[0] + at, &ones, sizeof ones);
+    __builtin_memcpy(c->plane[1] + at, &twos, sizeof twos);
+    __builtin_memcpy(c->plane[2] + at, &fours, sizeof fours);
+    for (int i = 3; i < PLANES && any(carry); i++) {
+        Quad old = quad_at(c->plane[i] + at), sum = old ^ carry;
+        __builtin_memcpy(c->plane[i] + at, &sum, sizeof sum);
+        carry &= old;
     }
-    return above;
 }
 
-static uint32_t counter_most(const Counter *c, Mask among) {
+/* Which stretches among `among` hold more than `value`. */
+static void counter_above(const Counter *c, int64_t value, const uint64_t *among, uint64_t *above) {
+    int none = value >= (int64_t)1 << c->planes;
+    for (int k = 0; k < c->words; k++) {
+        uint64_t more = 0, equal = among[k];
+        if (value < 0) { above[k] = equal; continue; }
+        for (int i = c->planes - 1; i >= 0; i--) {
+            uint64_t bit = c->plane[i][k];
+            if (value >> i & 1) equal &= bit;
+            else { more |= equal & bit; equal &= ~bit; }
+        }
+        above[k] = none ? 0 : more;
+    }
+}
+
+/* The largest count among some stretches, of words first .. last. */
+static uint32_t counter_most(const Counter *c, const uint64_t *among, int first, int last) {
+    uint64_t left[MOST_WORDS];
     uint32_t count = 0;
-    for (int i = PLANES - 1; i >= 0; i--) {
-        Mask t = among & c->plane[i];
-        if (any(t)) { among = t; count |= (uint32_t)1 << i; }
+    for (int k = first; k <= last; k++) left[k] = among[k];
+    for (int i = c->planes - 1; i >= 0; i--) {
+        uint64_t some = 0;
+        for (int k = first; k <= last; k++) some |= left[k] & c->plane[i][k];
+        if (!some) continue;
+        count |= (uint32_t)1 << i;
+        for (int k = first; k <= last; k++) left[k] &= c->plane[i][k];
     }
     return count;
 }
 
 static inline int stretch(double position, int bins) { return position < bins ? (int)position : bins - 1; }
 
-static uint64_t *raster_row(uint64_t *raster, int span, int spread, int ring, int phase) {
-    size_t row = (((size_t)span * (SPREADS - FIRST_SPREAD) + spread - FIRST_SPREAD) * RINGS + ring) * PHASES + phase;
-    return raster + row * ROW_WORDS;
+static inline int angles_of(int level) { return ANGLES << level; }
+static inline int rings_of(int level) { int n = angles_of(level) / 8; return n < LEAST_RINGS ? LEAST_RINGS : n; }
+static inline int row_words(int level) {
+    int n = angles_of(level) / 64;
+    return n + (n < MOST_WORDS ? n : MOST_WORDS) + 1;
+}
+static inline size_t level_words(int level) {
+    return (size_t)SPANS * (LAST_SPREAD - FIRST_SPREAD + 1) * rings_of(level) * row_words(level);
 }
 
-/* The union of two rows from word `from`, bit `bit` on. */
-static inline Mask rows_from(const uint64_t *a, const uint64_t *b, int from, int bit) {
-    Bits low, high;
-    a += from; b += from;
-    for (int i = 0; i < WORDS; i++) { low.word[i] = a[i] | b[i]; high.word[i] = a[i + 1] | b[i + 1]; }
-    return bit ? low.all >> bit | high.all << (64 - bit) : low.all;
+static inline const uint64_t *level_of(const uint64_t *raster, int level) {
+    for (int i = 0; i < level; i++) raster += level_words(i);
+    return raster;
 }
 
-static int fine_angle(double turns) { return (int)(int64_t)whole(turns * FINE); }
+static inline size_t row_of(int level, int span, int spread, int ring) {
+    return (((size_t)span * (LAST_SPREAD - FIRST_SPREAD + 1) + spread - FIRST_SPREAD) * rings_of(level) + ring) * row_words(level);
+}
+
+EXPORT int64_t mobius_raster_bytes(int64_t levels) {
+    size_t words = 0;
+    for (int i = 0; i < levels; i++) words += level_words(i);
+    return (int64_t)(words * sizeof(uint64_t));
+}
 
 /* Draw the discs of the one row of pairs. */
-EXPORT int64_t mobius_raster_bytes(void) {
-    return (int64_t)sizeof(uint64_t) * SPANS * (SPREADS - FIRST_SPREAD) * RINGS * PHASES * ROW_WORDS;
-}
-
 EXPORT void mobius_raster(const Problem *p) {
-    uint64_t *raster = p->raster;
-    Mask zero = {0};
-    for (int ring = 0; ring < RINGS; ring++) {
-        Bits phase[PHASES], next[PHASES];
-        for (int f = 0; f < PHASES; f++) phase[f].all = zero;
-        double near = ring * (1.0 / RINGS), far = (ring + 1) * (1.0 / RINGS);
-        for (int64_t k = p->start[0]; k < p->stop[0]; k++) {
-            const Pair *pair = p->pairs + k;
-            if (pair->outer < near || pair->inner > far) continue;
-            double half_width = pair_half_width(pair, near, far, 0x1p-14) + SLACK;
-            int first = fine_angle(pair->turn - half_width), last = fine_angle(pair->turn + half_width);
-            if (2 * half_width >= 1 || last - first >= FINE) { first = 0; last = FINE - 1; }
-            for (int i = first; i <= last; i++) {
-                int bit = (i & (FINE - 1)) / PHASES;
-                phase[i & (PHASES - 1)].word[bit >> 6] |= (uint64_t)1 << (bit & 63);
+    for (int level = 0; level < p->levels; level++) {
+        uint64_t *raster = (uint64_t *)level_of(p->raster, level);
+        int angles = angles_of(level), rings = rings_of(level), words = angles / 64, length = row_words(level);
+        uint64_t plain[(ANGLES << (MOST_LEVELS - 1)) / 64 + 1];
+        for (int ring = 0; ring < rings; ring++) {
+            double near = ring * (1.0 / rings), far = (ring + 1) * (1.0 / rings);
+            uint64_t *row = raster + row_of(level, 0, FIRST_SPREAD, ring);
+            for (int i = 0; i < words; i++) plain[i] = 0;
+            /* those of the rings of the grid that can reach here */
+            int64_t first = p->grid[p->nearest_ring[ring * p->rings / rings] * 2 * p->rings];
+            int64_t last = p->grid[(p->farthest_ring[ring * p->rings / rings] + 1) * 2 * p->rings];
+            for (int64_t k = first; k < last; k++) {
+                const Pair *pair = p->pairs + k;
+                if (pair->outer < near || pair->inner > far) continue;
+                double half_width = pair_half_width(pair, near, far, 0x1p-14) + SLACK;
+                if (2 * half_width + 2.0 / angles >= 1) { paint(plain, 0, angles - 1); continue; }
+                double begin = pair->turn - half_width;
+                begin -= whole(begin);
+                int low = (int)(begin * angles), high = (int)((begin + 2 * half_width) * angles);
+                if (low > angles - 1) low = angles - 1;
+                paint(plain, low, high < angles ? high : angles - 1);
+                if (high >= angles) paint(plain, 0, high - angles);
+            }
+            plain[words] = plain[0];
+            for (int i = 0; i < words; i++) row[i] = plain[i] | plain[i] >> 1 | plain[i + 1] << 63; /* spread by one */
+            for (int i = words; i < length; i++) row[i] = row[i - words];
+            /* widen by doubling: D_(q+1)(t) = D_q(t) | D_q(t + 2^q) */
+            for (int q = FIRST_SPREAD; q < LAST_SPREAD; q++) {
+                uint64_t *next = raster + row_of(level, 0, q + 1, ring);
+                int shift = 1 << q;
+                for (int i = 0; i < words; i++) next[i] = row[i] | row[i] >> shift | row[i + 1] << (64 - shift);
+                for (int i = words; i < length; i++) next[i] = next[i - words];
+                row = next;
             }
         }
-        /* widen by doubling: D_(q+1)(i) = D_q(i) | D_q(i + 2^q) */
-        for (int q = 0; q < SPREADS; q++) {
-            uint64_t twice[PHASES][ROW_WORDS];
-            for (int f = 0; f < PHASES; f++)
-                for (int i = 0; i < ROW_WORDS; i++) twice[f][i] = phase[f].word[i % WORDS];
-            for (int f = 0; f < PHASES; f++) {
-                if (q >= FIRST_SPREAD)
-                    for (int i = 0; i < ROW_WORDS; i++) raster_row(raster, 0, q, ring, f)[i] = twice[f][i];
-                int angle = f + (1 << q);
-                const uint64_t *row = twice[angle % PHASES];
-                int shift = angle / PHASES % BINS;
-                next[f].all = phase[f].all | rows_from(row, row, shift >> 6, shift & 63);
-            }
-            for (int f = 0; f < PHASES; f++) phase[f] = next[f];
-        }
+        for (int span = 1; span < SPANS; span++)
+            for (int q = FIRST_SPREAD; q <= LAST_SPREAD; q++)
+                for (int ring = 0; ring < rings; ring++) {
+                    int other = ring + (1 << (span - 1));
+                    uint64_t *row = raster + row_of(level, span, q, ring);
+                    const uint64_t *a = raster + row_of(level, span - 1, q, ring);
+                    const uint64_t *b = raster + row_of(level, span - 1, q, other < rings ? other : ring);
+                    for (int i = 0; i < length; i++) row[i] = a[i] | b[i];
+                }
     }
-    for (int span = 1; span < SPANS; span++)
-        for (int q = FIRST_SPREAD; q < SPREADS; q++)
-            for (int ring = 0; ring < RINGS; ring++) {
-                int other = ring + (1 << (span - 1));
-                uint64_t *row = raster_row(raster, span, q, ring, 0);
-                const uint64_t *a = raster_row(raster, span - 1, q, ring, 0);
-                const uint64_t *b = raster_row(raster, span - 1, q, other < RINGS ? other : ring, 0);
-                for (int i = 0; i < PHASES * ROW_WORDS; i++) row[i] = a[i] | b[i];
-            }
 }
 
-/* The stretches of all rotations that bring an image at alpha +- delta, [near, far] onto a disc, at least. */
-static inline Mask raster_mask(const uint64_t *raster, double near, double far, double alpha, double delta) {
-    Mask found = {0}, nowhere = {0};
-    int inside = (int)(near * RINGS), outside = (int)(far * RINGS);
-    if (inside > RINGS - 1) inside = RINGS - 1;
-    if (outside > RINGS - 1) outside = RINGS - 1;
-    int first = 0, count = FINE;
+/* Four words of the union of two rows, from bit `bit` of the first on. */
+static inline Quad rows_from(const uint64_t *a, const uint64_t *b, int bit) {
+    Quad low = quad_at(a) | quad_at(b), high = quad_at(a + 1) | quad_at(b + 1);
+    return low >> bit | high << 1 << (63 - bit);
+}
+
+/* Where in the raster to look for one source point: rows a and b from one bit on, c and d from another. */
+typedef struct { const uint64_t *a, *b, *c, *d; int bit, other; } Spot;
+
+/* The stretches of a window from `from` on that may bring an image at alpha +- delta, [near, far] onto a disc. `own`: room
+   for a row, in case that the image takes more than four of the raster's. */
+static inline Spot spot(const uint64_t *raster, int level, int words, double from, double near, double far, double alpha,
+                        double delta, uint64_t *own) {
+    int angles = angles_of(level), rings = rings_of(level);
+    int inside = (int)(near * rings), outside = (int)(far * rings);
+    if (inside > rings - 1) inside = rings - 1;
+    if (outside > rings - 1) outside = rings - 1;
+    int first = 0, count = angles;
     if (delta < 0.25) {
-        first = fine_angle(alpha - delta);
-        count = fine_angle(alpha + delta) + PHASES + 1 - first;
+        first = (int)(int64_t)whole((alpha - delta + from) * angles);
+        count = (int)(int64_t)whole((alpha + delta + from) * angles) + 2 - first;
     }
-    int everywhere = count > 2 << (SPREADS - 1);
-    int spread = everywhere ? SPREADS - 1 : 31 - __builtin_clz((unsigned)count);
-    if (spread > SPREADS - 1) spread = SPREADS - 1;
-    int second = first + count - (1 << spread);
-    first &= FINE - 1; second &= FINE - 1;
-    int span = 31 - __builtin_clz((unsigned)(outside - inside + 1));
+    int spread = 31 - __builtin_clz((unsigned)count), span = 31 - __builtin_clz((unsigned)(outside - inside + 1));
+    if (spread <= LAST_SPREAD && span < SPANS) {
+        int second = (first + count - (1 << spread)) & (angles - 1);
+        first &= angles - 1;
+        const uint64_t *a = raster + row_of(level, span, spread, inside);
+        const uint64_t *b = raster + row_of(level, span, spread, outside - (1 << span) + 1);
+        return (Spot){a + first / 64, b + first / 64, a + second / 64, b + second / 64, first & 63, second & 63};
+    }
+    for (int i = 0; i <= words; i++) own[i] = 0;
+    if (spread > LAST_SPREAD) spread = LAST_SPREAD;
     if (span > SPANS - 1) span = SPANS - 1;
-    /* two rows overlap to cover the rings, unless there are very many */
-    for (int ring = inside; ring <= outside; ring += 2 << span) {
-        int other = ring + (1 << span), last = outside - (1 << span) + 1;
-        const uint64_t *a = raster_row((uint64_t *)raster, span, spread, ring < last ? ring : last, 0);
-        const uint64_t *b = raster_row((uint64_t *)raster, span, spread, other < last ? other : last, 0);
-        found |= rows_from(a, b, (first & (PHASES - 1)) * ROW_WORDS + first / (64 * PHASES), first / PHASES & 63);
-        found |= rows_from(a, b, (second & (PHASES - 1)) * ROW_WORDS + second / (64 * PHASES), second / PHASES & 63);
+    for (int ring = inside; ring <= outside; ring += 1 << span) {
+        if (ring > outside - (1 << span) + 1) ring = outside - (1 << span) + 1;
+        for (int at = 0; at < count; at += 1 << spread) {
+            if (at > count - (1 << spread)) at = count - (1 << spread);
+            int bit = (first + at) & (angles - 1);
+            const uint64_t *row = raster + row_of(level, span, spread, ring) + bit / 64;
+            for (int i = 0; i < words; i += 4) {
+                Quad q = quad_at(own + i) | rows_from(row + i, row + i, bit & 63);
+                __builtin_memcpy(own + i, &q, sizeof q);
+            }
+        }
     }
-    if (everywhere) return any(found) ? ~nowhere : nowhere;
-    return found;
+    return (Spot){own, own, own, own, 0, 0};
 }
 
 /* Lay the arc over the window; returns whether it reaches into it. `bits` or `row` is painted. */
@@ -426,53 +472,57 @@ static inline int lay(double centre, double half_width, double from, double widt
     return pieces;
 }
 
-/* Cut the live stretches into windows: more than `gap` dead ones separate two. With gap 0 keep the widest only. */
-static void cluster(const uint64_t *live, int bins, double from, double width, int gap, Outcome *out) {
+/* Cut the live stretches, each `stretch` turns long, into windows: more than `gap` dead ones separate two. `round`: how many
+   make the full circle, or 0. */
+static void cluster(const uint64_t *live, int words, double from, double stretch, int round, int gap, Outcome *out) {
     int n = 0, start = -1, stop = -1;
-    for (int w = 0; w <= bins / 64; w++) {
-        uint64_t x = w < bins / 64 ? live[w] : 1; /* the last is a sentinel that closes the last window */
+    for (int w = 0; w <= words; w++) {
+        uint64_t x = w < words ? live[w] : 1; /* the last is a sentinel that closes the last window */
         while (x) {
             int bit = __builtin_ctzll(x), length = 1;
-            if (w < bins / 64) {
+            if (w < words) {
                 uint64_t rest = ~(x >> bit);
                 length = rest ? __builtin_ctzll(rest) : 64;
                 if (length > 64 - bit) length = 64 - bit;
             }
             x = bit + length < 64 ? x >> (bit + length) << (bit + length) : 0;
             int at = 64 * w + bit;
-            if (start >= 0 && at < bins && at - stop <= gap) { stop = at + length; continue; }
+            if (start >= 0 && w < words && at - stop <= gap) { stop = at + length; continue; }
             if (start >= 0) {
-                if (gap == 0) {
-                    if (n == 0 || stop - start > out->stop[0] - out->first[0]) { out->first[0] = start; out->stop[0] = stop; }
-                    n = 1;
-                } else if (n == CLUSTERS) out->stop[n - 1] = stop;
+                if (n == CLUSTERS) out->stop[n - 1] = stop;
                 else { out->first[n] = start; out->stop[n++] = stop; }
             }
             start = at; stop = at + length;
-            if (w == bins / 64) break;
+            if (w == words) break;
         }
     }
-    if (n > 1 && width >= 1 && out->first[0] + bins - out->stop[n - 1] <= gap) out->first[0] = out->first[--n] - bins;
+    if (round && n > 1 && out->first[0] + round - out->stop[n - 1] <= gap) out->first[0] = out->first[--n] - round;
     for (int c = 0; c < n; c++) {
-        out->cluster_from[c] = from + out->first[c] * (width / bins);
-        out->cluster_width[c] = (out->stop[c] - out->first[c]) * (width / bins);
+        out->cluster_from[c] = from + out->first[c] * stretch;
+        out->cluster_width[c] = (out->stop[c] - out->first[c]) * stretch;
     }
     out->clusters = n;
 }
 
 /* What to bound: a cell and a window, over `entries` pairs if not NULL (those of a cell and window around these), over
-   the raster if not NULL (then always of the full circle), or over all pairs. Only stretches worth more than `value`
-   count, and with gap 0 only the best of them. `children`: where the pairs that reach into the window go, or NULL. */
+   the raster, or over all pairs. Only stretches worth more than `value` count, and with `share` > 0 only those worth that
+   share of the best; more than `gap` others separate two windows.
+   `children`: where the pairs that reach into the window go, or NULL. */
 typedef struct {
     const Node *node;
     double value;
-    const uint64_t *raster;
+    int raster;
     const Entry *parents;
     int64_t entries;
     Entry *children;
     int64_t room;
     int gap;
+    double share;
 } Query;
+
+static inline double least_worth(const Query *q, uint32_t bound) {
+    return q->share > 0 ? most(q->value, least(bound * q->share, bound - 1.0)) : q->value;
+}
 
 typedef struct {
     const Problem *p;
@@ -481,7 +531,6 @@ typedef struct {
     double from, width, middle, reach, scale; /* the window */
     double fine;            /* a small part of a stretch */
     int bins;
-    Counter counter;
     uint32_t total[HEAVY_BINS], whole;
     Row row;
 } Laying;
@@ -524,31 +573,156 @@ static inline int lay_row(Laying *l, uint32_t j, double near, double far, double
         while (a < b) { int64_t mid = (a + b) / 2; if (p->inner[mid] <= far) a = mid + 1; else b = mid; }
         return lay_pairs(l, j, 0, low, a, near, far, alpha, delta, bits);
     }
-    int inside = (int)(near * GRID_RINGS), outside = (int)(far * GRID_RINGS), touched = 0;
-    inside = (int)p->nearest_ring[inside < GRID_RINGS ? inside : GRID_RINGS - 1];
-    outside = (int)p->farthest_ring[outside < GRID_RINGS ? outside : GRID_RINGS - 1];
+    int rings = (int)p->rings, all = 2 * rings, inside = (int)(near * rings), outside = (int)(far * rings), touched = 0;
+    inside = (int)p->nearest_ring[inside < rings ? inside : rings - 1];
+    outside = (int)p->farthest_ring[outside < rings ? outside : rings - 1];
     if (l->width >= 1 || delta > 0.25) {
         if (inside > outside) return 0;
-        return lay_pairs(l, j, 0, p->grid[inside * GRID_SECTORS], p->grid[(outside + 1) * GRID_SECTORS], near, far, alpha,
+        return lay_pairs(l, j, 0, p->grid[inside * all], p->grid[(outside + 1) * all], near, far, alpha,
                          delta, bits);
     }
     for (int ring = inside; ring <= outside; ring++) {
         double margin = delta + p->ring_wide[ring] + 0x1p-40, begin = alpha + l->from - margin;
         double end = begin + l->width + 2 * margin;
-        const int64_t *sectors = p->grid + ring * GRID_SECTORS;
-        if (end - begin > 1 - 2.0 / GRID_SECTORS) {
-            touched |= lay_pairs(l, j, 0, sectors[0], sectors[GRID_SECTORS], near, far, alpha, delta, bits);
+        const int64_t *sectors = p->grid + ring * all;
+        if (end - begin > 1 - 2.0 / all) {
+            touched |= lay_pairs(l, j, 0, sectors[0], sectors[all], near, far, alpha, delta, bits);
             continue;
         }
-        int first = (int)whole(begin * GRID_SECTORS), count = (int)whole(end * GRID_SECTORS) - first + 1;
-        first &= GRID_SECTORS - 1;
+        int first = (int)whole(begin * all), count = (int)whole(end * all) - first + 1;
+        first &= all - 1;
         int stop = first + count;
-        touched |= lay_pairs(l, j, 0, sectors[first], sectors[stop < GRID_SECTORS ? stop : GRID_SECTORS], near, far, alpha,
+        touched |= lay_pairs(l, j, 0, sectors[first], sectors[stop < all ? stop : all], near, far, alpha,
                              delta, bits);
-        if (stop > GRID_SECTORS)
-            touched |= lay_pairs(l, j, 0, sectors[0], sectors[stop - GRID_SECTORS], near, far, alpha, delta, bits);
+        if (stop > all)
+            touched |= lay_pairs(l, j, 0, sectors[0], sectors[stop - all], near, far, alpha, delta, bits);
     }
     return touched;
+}
+
+/* What the counted stretches of a window come to. */
+static void weigh(const Counter *count, const uint64_t *window, const Query *q, double from, double stretch, int round,
+                  Outcome *out) {
+    uint64_t above[MOST_WORDS];
+    out->bound = counter_most(count, window, 0, count->words - 1);
+    if ((double)out->bound <= q->value) return;
+    double value = least_worth(q, out->bound);
+    counter_above(count, value < 0 ? -1 : (int64_t)value, window, above);
+    cluster(above, count->words, from, stretch, round, q->gap, out);
+    for (int c = 0; c < out->clusters; c++) {
+        uint64_t among[MOST_WORDS];
+        int first = out->first[c], stop = out->stop[c], low = first > 0 ? first >> 6 : 0, high = (stop - 1) >> 6;
+        if (first < 0) { low = 0; high = count->words - 1; }
+        for (int k = low; k <= high; k++) among[k] = 0;
+        if (first < 0) { paint(among, first + round, round - 1); first = 0; }
+        paint(among, first, stop - 1);
+        for (int k = low; k <= high; k++) among[k] &= above[k];
+        out->cluster_bound[c] = counter_most(count, among, low, high);
+    }
+}
+
+/* Bound Q over a cell and a window by the raster, at the level that suits how far the images spread. */
+static void sum_raster(const Problem *p, Work *w, const Query *q, int64_t n, double from, double width, Outcome *out) {
+    double spread = 0;
+    for (int64_t i = 0; i < n; i++) spread += least(w->delta[i], 0x1p-4);
+    spread = SHARPNESS * (p->typical + spread / (double)n);
+    int level = 0;
+    while (level + 1 < p->levels && spread * angles_of(level) < 1) level++;
+    while (level > 0 && width * angles_of(level) > 64 * MOST_WORDS) level--;
+    while (level + 1 < p->levels && width * angles_of(level + 1) < 250) level++; /* no more words than that */
+    int angles = angles_of(level), bins = width < 1 ? (int)(width * angles) + 1 : angles;
+    int words = (bins + 255) / 256 * 4;
+    if (words > MOST_WORDS) words = MOST_WORDS;
+    static const uint64_t nothing[MOST_WORDS + 1];
+    const uint64_t *raster = level_of(p->raster, level);
+    Counter *count = &w->counter;
+    counter_clear(count, words, (int)p->planes);
+    for (int64_t j = 0; j < n; j += 8) {
+        Spot at[8];
+        for (int i = 0; i < 8; i++)
+            if (j + i < n)
+                at[i] = spot(raster, level, words, from, w->near[j + i], w->far[j + i], w->alpha[j + i], w->delta[j + i], w->own[i]);
+            else at[i] = (Spot){nothing, nothing, nothing, nothing, 0, 0};
+        for (int k = 0; k < words; k += 4) {
+            Quad mask[8];
+            for (int i = 0; i < 8; i++)
+                mask[i] = rows_from(at[i].a + k, at[i].b + k, at[i].bit) | rows_from(at[i].c + k, at[i].d + k, at[i].other);
+            counter_add(count, k, mask);
+        }
+    }
+    uint64_t window[MOST_WORDS] = {0};
+    paint(window, 0, bins < 64 * words ? bins - 1 : 64 * words - 1);
+    weigh(count, window, q, from, 1.0 / angles, width < 1 ? 0 : angles, out);
+}
+
+static void sum_pairs(const Problem *p, Work *w, const Query *q, int64_t n, double from, double width, Outcome *out) {
+    Laying l;
+    l.p = p; l.q = q; l.out = out;
+    l.from = from; l.width = width;
+    l.bins = p->weight ? HEAVY_BINS : BINS;
+    l.scale = l.bins / width;
+    l.fine = width / l.bins / 32;
+    l.middle = from + width / 2; l.reach = width / 2 + 0x1p-40;
+    l.whole = 0;
+    Quad mask[2][8];
+    int waiting = 0;
+    if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] = 0;
+    else counter_clear(&w->counter, WORDS, (int)p->planes);
+    int64_t cursor = 0;
+    for (int64_t i = 0; i < n; i++) {
+        double near = w->near[i], far = w->far[i], alpha = w->alpha[i], delta = w->delta[i];
+        uint64_t bits[WORDS] = {0};
+        uint32_t j = q->parents ? w->active[i] : (uint32_t)i;
+        l.row.whole = 0; l.row.clean = 1;
+        int touched;
+        if (q->parents) {
+            int64_t low = cursor;
+            while (cursor < q->entries && q->parents[cursor].point == j) cursor++;
+            touched = lay_pairs(&l, j, q->parents, low, cursor, near, far, alpha, delta, p->weight ? 0 : bits);
+        } else touched = lay_row(&l, j, near, far, alpha, delta, p->weight ? 0 : bits);
+        if (!touched) continue;
+        if (p->weight) {
+            uint32_t all = l.row.whole;
+            l.whole += all;
+            if (!l.row.clean)
+                for (int k = 0; k < HEAVY_BINS; k++)
+                    l.total[k] += l.row.stretch[k] > all ? l.row.stretch[k] - all : 0;
+        } else {
+            for (int k = 0; k < WORDS / 4; k++) mask[k][waiting] = quad_at(bits + 4 * k);
+            if (++waiting == 8) { waiting = 0; for (int k = 0; k < WORDS / 4; k++) counter_add(&w->counter, 4 * k, mask[k]); }
+        }
+    }
+    if (q->children && out->entries > q->room) out->entries = -1; /* too many to keep */
+
+    if (p->weight) {
+        uint32_t best = 0;
+        for (int k = 0; k < HEAVY_BINS; k++) {
+            l.total[k] += l.whole;
+            best = l.total[k] > best ? l.total[k] : best;
+        }
+        out->bound = best;
+        if ((double)best <= q->value) return;
+        uint64_t live[HEAVY_BINS / 64] = {0};
+        double value = least_worth(q, best);
+        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > value) << (k & 63);
+        cluster(live, HEAVY_BINS / 64, from, width / HEAVY_BINS, width < 1 ? 0 : HEAVY_BINS, q->gap, out);
+        for (int c = 0; c < out->clusters; c++) {
+            out->cluster_bound[c] = 0;
+            for (int k = out->first[c]; k < out->stop[c]; k++) {
+                uint32_t t = l.total[k < 0 ? k + HEAVY_BINS : k];
+                if (t > out->cluster_bound[c]) out->cluster_bound[c] = t;
+            }
+        }
+        return;
+    }
+    if (waiting) {
+        Quad zero = {0};
+        for (; waiting < 8; waiting++) for (int k = 0; k < WORDS / 4; k++) mask[k][waiting] = zero;
+        for (int k = 0; k < WORDS / 4; k++) counter_add(&w->counter, 4 * k, mask[k]);
+    }
+    uint64_t window[WORDS];
+    for (int k = 0; k < WORDS; k++) window[k] = ~(uint64_t)0;
+    weigh(&w->counter, window, q, from, width / BINS, width < 1 ? 0 : BINS, out);
 }
 
 /* Bound Q over a cell and a window, which is moved and widened from the parent's kappa to ours. */
@@ -574,98 +748,15 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
     out->kx = kx; out->ky = ky;
     images(n, mx, my, node->x, node->y, node->half, kx, ky, w->alpha, w->delta, w->near, w->far);
 
-    Laying l;
-    l.p = p; l.q = q; l.out = out;
-    l.from = node->from; l.width = node->width;
-    if (l.width < 1) {
+    double from = node->from, width = node->width;
+    if (width < 1) {
         double shift = node->half * (positive(kx - node->kx) + positive(ky - node->ky)) * PER_RADIAN + 0x1p-40;
-        l.from -= shift; l.width += 2 * shift;
-        if (l.width > FULL) { l.from = 0; l.width = 1; }
-    }
-    Bits window;
-    Mask zero = {0};
-    window.all = ~zero;
-    if (q->raster && l.width < 1) {
-        window.all = zero;
-        lay(l.from + l.width / 2, l.width / 2 + 0x1p-40, 0, 1, BINS, BINS, window.word, 0, 1);
-        l.from = 0; l.width = 1;
-    }
-    l.bins = p->weight ? HEAVY_BINS : BINS;
-    l.scale = l.bins / l.width;
-    l.fine = l.width / l.bins / 32;
-    l.middle = l.from + l.width / 2; l.reach = l.width / 2 + 0x1p-40;
-    l.whole = 0;
-    if (p->weight) for (int k = 0; k < HEAVY_BINS; k++) l.total[k] = 0;
-    else {
-        for (int i = 0; i < PLANES; i++) l.counter.plane[i] = zero;
-        l.counter.waiting = 0;
+        from -= shift; width += 2 * shift;
+        if (width > FULL) { from = 0; width = 1; }
     }
     out->entries = 0; out->painted = 0; out->clusters = 0;
-    int64_t cursor = 0;
-    for (int64_t i = 0; i < n; i++) {
-        double near = w->near[i], far = w->far[i], alpha = w->alpha[i], delta = w->delta[i];
-        Bits *bits = &l.counter.pending[l.counter.waiting];
-        if (q->raster) {
-            bits->all = raster_mask(q->raster, near, far, alpha, delta);
-            if (++l.counter.waiting == 8) counter_flush(&l.counter);
-            continue;
-        }
-        uint32_t j = q->parents ? w->active[i] : (uint32_t)i;
-        l.row.whole = 0; l.row.clean = 1;
-        if (!p->weight) bits->all = zero;
-        int touched;
-        if (q->parents) {
-            int64_t low = cursor;
-            while (cursor < q->entries && q->parents[cursor].point == j) cursor++;
-            touched = lay_pairs(&l, j, q->parents, low, cursor, near, far, alpha, delta, p->weight ? 0 : bits->word);
-        } else touched = lay_row(&l, j, near, far, alpha, delta, p->weight ? 0 : bits->word);
-        if (!touched) continue;
-        if (p->weight) {
-            uint32_t all = l.row.whole;
-            l.whole += all;
-            if (!l.row.clean)
-                for (int k = 0; k < HEAVY_BINS; k++)
-                    l.total[k] += l.row.stretch[k] > all ? l.row.stretch[k] - all : 0;
-        } else if (++l.counter.waiting == 8) counter_flush(&l.counter);
-    }
-    if (q->children && out->entries > q->room) out->entries = -1; /* too many to keep */
-
-    if (p->weight) {
-        uint32_t best = 0;
-        for (int k = 0; k < HEAVY_BINS; k++) {
-            l.total[k] += l.whole;
-            best = l.total[k] > best ? l.total[k] : best;
-        }
-        out->bound = best;
-        if ((double)best <= q->value) return;
-        uint64_t live[HEAVY_BINS / 64] = {0};
-        double value = q->gap ? q->value : best - 1.0;
-        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > value) << (k & 63);
-        cluster(live, HEAVY_BINS, l.from, l.width, q->gap, out);
-        for (int c = 0; c < out->clusters; c++) {
-            out->cluster_bound[c] = 0;
-            for (int k = out->first[c]; k < out->stop[c]; k++) {
-                uint32_t t = l.total[k < 0 ? k + HEAVY_BINS : k];
-                if (t > out->cluster_bound[c]) out->cluster_bound[c] = t;
-            }
-        }
-        return;
-    }
-    if (l.counter.waiting) counter_flush(&l.counter);
-    out->bound = counter_most(&l.counter, window.all);
-    if ((double)out->bound <= q->value) return;
-    double value = q->gap ? q->value : out->bound - 1.0;
-    Bits above;
-    above.all = window.all & counter_above(&l.counter, value < 0 ? -1 : (int64_t)value);
-    cluster(above.word, BINS, l.from, l.width, q->gap, out);
-    for (int c = 0; c < out->clusters; c++) {
-        Bits among;
-        among.all = zero;
-        int first = out->first[c], stop = out->stop[c];
-        if (first < 0) { paint(among.word, first + BINS, BINS - 1); first = 0; }
-        paint(among.word, first, stop - 1);
-        out->cluster_bound[c] = counter_most(&l.counter, among.all & above.all);
-    }
+    if (q->raster) sum_raster(p, w, q, n, from, width, out);
+    else sum_pairs(p, w, q, n, from, width, out);
 }
 
 static int64_t doubles_of(int64_t points) { return 8 * points; }
@@ -720,37 +811,44 @@ EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, int32_t rast
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
         Outcome out;
-        Query query = {&nodes[i], 0x1p40, raster ? p->raster : 0, 0, 0, 0, 0, 1};
+        Query query = {&nodes[i], 0x1p40, raster && p->raster, 0, 0, 0, 0, 1, 0};
         evaluate(p, &w, &query, &out);
         nodes[i].bound = out.bound; nodes[i].kx = out.kx; nodes[i].ky = out.ky;
     }
 }
 
-/* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretch,
+/* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretches,
    from a window on. Worth 0: not above `value`, or not above the z before it. */
 EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, double from, double width,
                              double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
-        Node node = {x[i], y[i], 0, 0, 0, from, width, 0};
-        Outcome out;
+        Node open[LOOKS * CLUSTERS + 1];
+        int depth = 1, raster = p->raster != 0;
+        open[0] = (Node){x[i], y[i], 0, 0, 0, from, width, 0x1p40};
         turns[i] = bounds[i] = 0;
-        Query query = {&node, value, p->raster, 0, 0, 0, 0, 0};
-        if (p->raster && width >= 1) {
+        for (int looks = 0; depth && looks < LOOKS; looks++) {
+            Node node = open[--depth];
+            if (node.bound <= value) continue;
+            Outcome out;
+            Query query = {&node, value, raster, 0, 0, 0, 0, ALIKE, node.width > 0x1p-6 ? 0.85 : 1};
             evaluate(p, &w, &query, &out);
-            if (out.bound <= value) continue;
+            int base = depth;
+            for (int c = 0; c < out.clusters; c++) {
+                Node next = node;
+                next.from = out.cluster_from[c]; next.width = out.cluster_width[c]; next.bound = out.cluster_bound[c];
+                if (next.width > FULL) { next.from = node.from; next.width = node.width; }
+                int k = depth++;
+                while (k > base && open[k - 1].bound > next.bound) { open[k] = open[k - 1]; k--; }
+                open[k] = next;
+            }
+            if (raster || !out.clusters) { raster = 0; continue; }
+            Node best = open[depth - 1];
+            if (best.width > SHARP && best.width < 0.9 * node.width) continue;
+            depth = base;
+            turns[i] = best.from + 0.5 * best.width;
+            bounds[i] = value = best.bound;
         }
-        query.raster = 0;
-        for (int zoom = 0; zoom < 5; zoom++) {
-            evaluate(p, &w, &query, &out);
-            bounds[i] = out.bound;
-            if (!out.clusters) break;
-            turns[i] = out.cluster_from[0] + 0.5 * out.cluster_width[0];
-            if (out.cluster_width[0] > FULL) break;
-            node.from = out.cluster_from[0]; node.width = out.cluster_width[0];
-        }
-        if (bounds[i] > value) value = bounds[i];
-        else bounds[i] = 0;
     }
 }
 
@@ -788,10 +886,10 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                 if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) continue;
                 if (child.width < 1) child.from -= (child.kx * sy + child.ky * sx) * PER_RADIAN;
                 const Entry *list = open.entries < 0 ? 0 : w.arena + open.offset;
-                int gap = p->weight ? HEAVY_BINS / 16 : BINS / 16, raster = p->raster && half >= COARSE && !list;
+                int gap = (p->weight ? HEAVY_BINS : BINS) / 16, raster = p->raster && half >= p->coarse && !list;
                 Outcome coarse, out;
                 if (raster) {
-                    Query query = {&child, value, p->raster, 0, 0, 0, 0, gap};
+                    Query query = {&child, value, 1, 0, 0, 0, 0, RASTER_GAP, 0};
                     evaluate(p, &w, &query, &coarse);
                     bounds++; spent++;
                     child.kx = coarse.kx; child.ky = coarse.ky;
@@ -803,12 +901,12 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                     child.from = coarse.cluster_from[c]; child.width = coarse.cluster_width[c];
                     child.bound = least(coarse.cluster_bound[c], open.node.bound);
                     if (child.width > FULL) { child.from = 0; child.width = 1; }
-                    if (raster && child.width * half > NARROW) {
+                    if (raster && child.width * (half + p->typical) * p->density > FEW_PAIRS) {
                         stack[depth++] = (Open){child, 0, -1, 0};
                         continue;
                     }
                     Entry *children = child.width < 1 ? w.arena + top : 0;
-                    Query query = {&child, value, 0, list, open.entries, children, w.room - top, gap};
+                    Query query = {&child, value, 0, list, open.entries, children, w.room - top, gap, 0};
                     evaluate(p, &w, &query, &out);
                     bounds++; spent++; painted += out.painted; inherited += list != 0;
                     int64_t kept = children ? out.entries : -1;

@@ -110,7 +110,8 @@ def test_the_raster_rounds_outward(seed):
     kernels = CompiledKernels(problem, 0.9, SMALLEST_CELL)
     centre, half = random_cells(rng, problem, 60)
     nodes = cells_as_nodes(centre, half)
-    exact, coarse = kernels.bounds(nodes)[:, BOUND], kernels.bounds(nodes, raster=True)[:, BOUND]
+    found = kernels.bounds(nodes, raster=True)
+    exact, coarse = swept(problem, nodes, found[:, KAPPA_X] + 1j * found[:, KAPPA_Y], -1e-11), found[:, BOUND]
     assert (exact <= coarse).all()
     assert coarse.mean() <= exact.mean() + 0.5 * n1
     z, inside = points_of_cells(rng, centre, half)
