@@ -38,6 +38,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
+        "flips_repaired": {"source": alignment.source.flips_repaired, "target": alignment.target.flips_repaired},
         "seconds": dict(alignment.seconds),
         "settings": asdict(alignment.settings),
         "warnings": list(alignment.warnings),

@@ -41,8 +41,32 @@ def run_times(path: Path, rows: list[dict[str, Any]], times: list[dict[str, Any]
     _save(figure, path)
 
 
+def collapse(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Draw the proven optimum against the bound on |z|: how many points it matches, and how many pairs are right."""
+    figure, axes = plt.subplots(figsize=(6.4, 3.4))
+    for objective, colour in zip(dict.fromkeys(row["objective"] for row in rows), (WRONG, RIGHT), strict=True):
+        shown = [row for row in rows if row["objective"] == objective]
+        bound = [1 - row["z_max"] for row in shown]
+        axes.plot(bound, [row["Q_bnb"] for row in shown], "o-", color=colour, label=f"{objective}: matched")
+        right = [row["Q_truth"] for row in shown]
+        axes.plot(bound, right, "s:", color=colour, markersize=4, label=f"{objective}: right pairs")
+    axes.axhline(rows[0]["inliers"], color="black", linewidth=0.8, linestyle="--")
+    axes.annotate("inliers", (0.4, rows[0]["inliers"] + 2), fontsize=7)
+    axes.set(xscale="log", xlabel="1 - bound on |z|", ylabel="points", title="The optimum as the bound is lifted")
+    axes.invert_xaxis()
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.02, 0.5))
+    _save(figure, path)
+
+
 def on_silhouette(
-    path: Path, flat: Flattening, problem: Problem, found: SearchResult, planted: Mobius, good: np.ndarray
+    path: Path,
+    title: str,
+    flat: Flattening,
+    problem: Problem,
+    found: SearchResult,
+    planted: Mobius,
+    good: np.ndarray,
 ) -> None:
     """Draw the shape with its points, the two discs, and the source carried over: matched right, matched wrong, not."""
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.9), width_ratios=[1.5, 1, 1])
@@ -53,7 +77,7 @@ def on_silhouette(
     colours = [POINT if j not in near else RIGHT if near[j] and j in good else WRONG for j in range(len(image))]
     axes[0].triplot(*flat.mesh.vertices[:, :2].T, flat.mesh.faces, linewidth=0.2, color="#b9bec6")
     axes[0].scatter(*flat.mesh.vertices[vertex, :2].T, s=14, c=colours, zorder=3)
-    axes[0].set_title(f"{flat.mesh.name}, {len(vertex)} source points")
+    axes[0].set_title(title)
     _disc(axes[1], "source, packed with circles")
     axes[1].scatter(problem.source.real, problem.source.imag, s=12, c=colours)
     _disc(axes[2], "target (rings), source carried over")

@@ -230,13 +230,15 @@ def run(folder: Path, sizes: list[int], trials: int, jobs: int) -> None:
     (folder / "synthetic.txt").write_text("\n".join(text), encoding="utf-8")
     print("\n".join([*text[:3], *text[4:]]))
     figures.run_times(folder / "synthetic_times.png", summary, times)
-    shown = Setting(INVARIANT, plain, 0.25, max(sizes))
-    problem, planted, good = drawn(shown)
-    figures.on_silhouette(
-        folder / "synthetic_correspondences.png",
-        silhouette()[0],
-        problem,
-        result(problem, "Möbius search"),
-        planted,
-        good,
-    )
+    figures.collapse(folder / "synthetic_collapse.png", collapse)
+    for objective, end in ((INVARIANT, "correspondences"), (PRINTED, "as_printed")):
+        problem, planted, good = drawn(Setting(objective, plain, 0.25, max(sizes)))
+        figures.on_silhouette(
+            folder / f"synthetic_{end}.png",
+            f"{silhouette()[0].mesh.name}, {objective}",
+            silhouette()[0],
+            problem,
+            result(problem, "Möbius search"),
+            planted,
+            good,
+        )
