@@ -9,15 +9,20 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import KDTree
 
+from .agreement import trust
+from .baselines.fit import algebraic_fit
 from .descriptors import diffused_mean_curvature, standardised
 from .flatten import Flattening, flatten
 from .landmarks import usable_landmarks, with_landmarks
-from .mesh import Complexes, Floats, Integers, TriangleMesh
+from .locate import TriangulatedDisc
+from .mesh import Booleans, Complexes, Floats, Integers, MeshError, TriangleMesh
 from .mobius import Mobius, hyperbolic_distance
-from .nonrigid import Bending, bent
+from .nonrigid import Bending, Draft, drafted, finished
+from .overlap import Piece, piece, shared
 from .refine import refined
-from .rival import Rival, best_rival
+from .rival import ELSEWHERE, Rival, best_rival
 from .sampling import extrema, farthest_points
 from .search import SearchProgress, SearchResult, search
 
@@ -104,6 +109,19 @@ class Progress:
     nodes: int | None = None
 
 
+PARTIAL = 0.02
+"""Share of either surface's area without a counterpart from which on the rest is cut out and aligned anew."""
+
+SMALLEST_OVERLAP = 0.1
+"""Share of either surface's area below which an overlap is no ground to go on from."""
+
+SETTLED = 0.005
+"""Change of the shares without a counterpart below which an overlap is settled."""
+
+DRAFTS = 4
+"""Drafts at most until the overlap is settled."""
+
+
 @dataclass(frozen=True, eq=False)
 class Alignment:
     """Two flattened surfaces and the transformation between their discs.
@@ -121,7 +139,12 @@ class Alignment:
         Standardised descriptors of all vertices.
     settings : AlignSettings
     bending : Bending or None
-        Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not.
+        Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not, or not
+        as a whole.
+    overlap : Overlap or None
+        The parts that both surfaces show, aligned by themselves; None if that is all of them, or was not asked.
+    counterpart : (n_target,) bool or None
+        Which target vertices have a counterpart on the source: those not beyond its boundary; None if it was not asked.
     margin : float or None
         By how much of the samples the chosen orientation beat the other; None if only one was searched.
     rival : Rival or None
@@ -142,6 +165,8 @@ class Alignment:
     target_descriptors: Floats
     settings: AlignSettings
     bending: Bending | None = None
+    overlap: Overlap | None = None
+    counterpart: Booleans | None = None
     margin: float | None = None
     rival: Rival | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -159,10 +184,62 @@ class Alignment:
         """Where each target vertex goes in the source's disc, (n_target,); nan at vertices in no face."""
         if self.bending is not None:
             return self.bending.carried
+        if self.overlap is not None:
+            places = np.full(len(self.target.disc), complex(np.nan, np.nan))
+            face, barycentric = self.located
+            has = np.flatnonzero(face >= 0)
+            places[has] = (self.source.disc[self.source.mesh.faces[face[has]]] * barycentric[has]).sum(axis=1)
+            return places
         places = self.target.disc.copy()
         used = np.isfinite(places.real)
         places[used] = self.mobius.inverse()(places[used])
         return places
+
+    @cached_property
+    def located(self) -> tuple[Integers, Floats]:
+        """The source's face, (n_target,), and the barycentric coordinates in it, (n_target, 3), of each target vertex.
+
+        -1 and 0 at vertices in no face. Target vertices beyond the source's boundary are at the nearest point of it.
+        """
+        size = len(self.target.disc)
+        face, barycentric = np.full(size, -1), np.zeros((size, 3))
+        if self.overlap is None:
+            used = np.flatnonzero(np.isfinite(self.target.disc.real))
+            disc = TriangulatedDisc.of(self.source.disc, self.source.mesh.faces)
+            face[used], barycentric[used] = disc.locate(self.carried[used])
+            return face, barycentric
+        parts = self.overlap
+        inner, weights = parts.alignment.located
+        outside = np.setdiff1d(np.flatnonzero(np.isfinite(self.target.disc.real)), parts.target.vertices)
+        face[outside], barycentric[outside] = parts.nearest_face[outside], parts.nearest_barycentric[outside]
+        face[parts.target.vertices] = parts.source.faces[inner]
+        barycentric[parts.target.vertices] = weights
+        return face, barycentric
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """The parts that two surfaces have in common.
+
+    Attributes
+    ----------
+    alignment : Alignment
+        Of the two parts, as surfaces of their own.
+    source, target : Piece
+        What they are of the whole surfaces.
+    source_share, target_share : float
+        Of the whole surfaces' areas.
+    nearest_face, nearest_barycentric : (n_target,) int, (n_target, 3) float64
+        The point of the whole source next to each target vertex in the draft; what lies beyond is next to the boundary.
+    """
+
+    alignment: Alignment
+    source: Piece
+    target: Piece
+    source_share: float
+    target_share: float
+    nearest_face: Integers
+    nearest_barycentric: Floats
 
 
 def align(
@@ -174,6 +251,9 @@ def align(
     landmarks: npt.ArrayLike | None = None,
 ) -> Alignment:
     """Find where every point of the target belongs on the source; landmarks are not needed.
+
+    With dense refinement the surfaces may show different pieces of the same thing. The overlap is found from a stiff
+    draft of the bending, cut out of both, and aligned by itself: `Alignment.overlap`.
 
     Parameters
     ----------
@@ -197,14 +277,29 @@ def align(
     """
     settings = settings or AlignSettings()
     clock = _Stages(progress)
+    found = _matched(source_mesh, target_mesh, settings, clock.part(0, 0.7), landmarks)
+    if settings.refine == "dense":
+        found = _bent(found, clock.part(0.7, 1), landmarks)
+    clock.end()
+    return replace(found, seconds=clock.seconds)
+
+
+def _matched(
+    source_mesh: TriangleMesh,
+    target_mesh: TriangleMesh,
+    settings: AlignSettings,
+    clock: _Part,
+    landmarks: npt.ArrayLike | None,
+) -> Alignment:
+    """Flatten, search, and refine the transformation."""
     clock.begin("flatten source", "Flattening the source", 0.0)
     source = flatten(source_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.source_outer)
-    clock.begin("flatten target", "Flattening the target", 0.08)
+    clock.begin("flatten target", "Flattening the target", 0.1)
     target = flatten(target_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.target_outer)
-    clock.begin("descriptors", "Measuring curvature", 0.16)
+    clock.begin("descriptors", "Measuring curvature", 0.2)
     source_descriptors = standardised(diffused_mean_curvature(source_mesh), source_mesh.vertex_areas)
     target_descriptors = standardised(diffused_mean_curvature(target_mesh), target_mesh.vertex_areas)
-    clock.begin("sampling", "Choosing points", 0.25)
+    clock.begin("sampling", "Choosing points", 0.3)
     source_samples = _samples(source, source_descriptors, settings.samples)
     target_samples = farthest_points(target_mesh, settings.targets, np.empty(0, np.intp), _interior(target))
     problem = _Problem(
@@ -232,13 +327,8 @@ def align(
         )
     mobius = rival.mobius if settings.take_rival else found.mobius
     if settings.refine != "none":
-        clock.begin("refine", "Refining", 0.8)
+        clock.begin("refine", "Refining", 0.9)
         mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings.descriptor_scale)
-    bending = None
-    if settings.refine == "dense":
-        clock.begin("bend", "Bending", 0.85)
-        bending = bent(mobius, source, target, clock.within(0.85, 1.0))
-    clock.end()
     if not found.certified:
         share = 100 * found.gap / max(found.upper_bound, 1e-300)
         warnings.append(f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given")
@@ -252,12 +342,159 @@ def align(
         source_descriptors=source_descriptors,
         target_descriptors=target_descriptors,
         settings=settings,
-        bending=bending,
         margin=margin,
         rival=rival,
-        seconds=clock.seconds,
         warnings=tuple(warnings),
     )
+
+
+def _bent(found: Alignment, clock: _Part, landmarks: npt.ArrayLike | None) -> Alignment:
+    """Bend the target onto the source; where they show different pieces, the pieces that they share."""
+    clock.begin("bend", "Bending", 0.0)
+    source, target = found.source, found.target
+    believed = trust(
+        found.mobius,
+        source,
+        target,
+        found.source_descriptors,
+        found.target_descriptors,
+        found.settings.descriptor_scale,
+    )
+    draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.2))
+    here, there = shared(draft, source, target)
+    if max(_left_out(source, here), _left_out(target, there)) <= PARTIAL:
+        bending = finished(draft, source, target, progress=clock.within(0.2, 1.0))
+        return replace(found, bending=bending, counterpart=there)
+    clock.begin("overlap", "Finding the overlap", 0.2)
+    for _ in range(DRAFTS - 1):
+        # pose and scale again, from where the surfaces meet
+        draft = drafted(found.mobius, source, target, np.where(there, 1.0, 1e-3), draft.places(target))
+        before = here, there
+        here, there = shared(draft, source, target)
+        if max(_left_out(source, here == before[0]), _left_out(target, there == before[1])) < SETTLED:
+            break
+    overlap = _overlap(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+    if overlap is None:
+        warnings = ("the surfaces seem to share too small a piece: nothing beyond the Möbius map was tried",)
+        return replace(found, counterpart=there, warnings=found.warnings + warnings)
+    apart = [
+        f"{100 * (1 - share):.0f} % of the {name}'s area"
+        for name, share in (("source", overlap.source_share), ("target", overlap.target_share))
+        if share < 1 - SETTLED
+    ]
+    warnings = [f"partial overlap: {' and '.join(apart)} without a counterpart on the other surface"]
+    # what the whole discs left open the pieces may decide
+    warnings += [said for said in found.warnings if not said.startswith("ambiguous: ")]
+    warnings += [f"in the overlap: {said}" for said in overlap.alignment.warnings]
+    counterpart = np.zeros(len(target.disc), bool)
+    counterpart[overlap.target.vertices] = overlap.alignment.counterpart
+    return replace(found, overlap=overlap, counterpart=counterpart, warnings=tuple(warnings))
+
+
+def _left_out(flattening: Flattening, kept: Booleans) -> float:
+    """Return the share of the area around vertices that are not kept, (n,)."""
+    return float(flattening.mesh.vertex_areas[~kept].sum() / flattening.mesh.area)
+
+
+def _overlap(
+    found: Alignment,
+    draft: Draft,
+    source_part: Piece | None,
+    target_part: Piece | None,
+    clock: _Part,
+    landmarks: npt.ArrayLike | None,
+) -> Overlap | None:
+    """Align the parts that the surfaces share, beginning at a draft of the whole; None where there is hardly any."""
+    if source_part is None or target_part is None:
+        return None
+    source_share = source_part.mesh.area / found.source.mesh.area
+    target_share = target_part.mesh.area / found.target.mesh.area
+    if min(source_share, target_share) < SMALLEST_OVERLAP:
+        return None
+    settings = replace(
+        found.settings,
+        reflect="always" if found.mobius.reflected else "never",
+        take_rival=False,
+        source_outer=source_part.outer,
+        target_outer=target_part.outer,
+    )
+    try:
+        pairs = _within(landmarks, source_part, target_part)
+        inner = _matched(source_part.mesh, target_part.mesh, settings, clock.part(0.2, 0.5, "overlap"), pairs)
+    except MeshError:  # too small a piece to flatten
+        return None
+    used = np.flatnonzero(np.isfinite(found.target.disc.real))
+    places = draft.places(found.target)
+    normals = TriangleMesh(places, draft.whole.faces).vertex_normals()
+    face, barycentric = np.full(len(places), -1), np.zeros((len(places), 3))
+    face[used], barycentric[used] = draft.onto.nearest_point(places[used], normals[used])
+    inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
+
+    clock.begin("bend", "Bending", 0.5)
+    scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
+    middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
+    start = scale * (places[target_part.vertices] - middle)
+    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
+    _, there = shared(again, inner.source, inner.target)
+    bending = finished(
+        again,
+        inner.source,
+        inner.target,
+        _alike(again, inner, source_part.cut, target_part.cut),
+        clock.within(0.6, 1.0),
+    )
+    inner = replace(inner, bending=bending, counterpart=there)
+    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
+
+
+def _within(landmarks: npt.ArrayLike | None, source: Piece, target: Piece) -> Integers | None:
+    """Return the landmarks that lie in both pieces, as vertices of these."""
+    if landmarks is None or np.size(landmarks) == 0:
+        return None
+    pairs = np.asarray(landmarks)
+    rows = [np.searchsorted(part.vertices, column) for part, column in zip((source, target), pairs.T, strict=True)]
+    inside = [
+        part.vertices[np.minimum(row, len(part.vertices) - 1)] == column
+        for part, row, column in zip((source, target), rows, pairs.T, strict=True)
+    ]
+    return np.stack(rows, axis=1)[inside[0] & inside[1]]
+
+
+def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Floats) -> Alignment:
+    """Return the pieces' alignment, with the transformation that the draft of the whole implies if it found another.
+
+    `face`, (k,), and `barycentric`, (k, 3), are where the draft puts the target piece's vertices on the whole source.
+    """
+    place = np.searchsorted(source.faces, face)
+    place = np.minimum(place, len(source.faces) - 1)
+    there = np.flatnonzero((source.faces[place] == face) & np.isfinite(inner.target.disc.real))
+    expected = (inner.source.disc[source.mesh.faces[place[there]]] * barycentric[there]).sum(axis=1)
+    disc = inner.target.disc[there]
+    inside = (np.abs(expected) < 1 - 1e-6) & (np.abs(disc) < 1 - 1e-6)
+    expected, disc = expected[inside], disc[inside]
+    apart = hyperbolic_distance(inner.mobius.inverse()(disc), expected)
+    if len(apart) < 3 or np.median(apart) < ELSEWHERE:
+        return inner
+    reflected = inner.mobius.reflected
+    fit = algebraic_fit(np.conj(expected) if reflected else expected, disc, np.ones(len(disc)))
+    mobius = refined(
+        replace(fit, reflected=reflected),
+        inner.source,
+        inner.target,
+        inner.source_descriptors,
+        inner.target_descriptors,
+        inner.settings.descriptor_scale,
+    )
+    said = "ambiguous: the best map of the pieces by themselves sends everything elsewhere"
+    return replace(inner, mobius=mobius, warnings=(*inner.warnings, said))
+
+
+def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Booleans) -> Booleans:
+    """Return the target vertices, (n,), that are near a boundary that the whole surfaces have, not one of a cut."""
+    places = draft.places(inner.target)
+    loops = np.concatenate([inner.source.boundary, *inner.source.holes])
+    nearest = loops[KDTree(draft.onto.mesh.vertices[loops]).query(places)[1]]
+    return ~target_cut & ~source_cut[nearest]
 
 
 def compatibility(source: Floats, target: Floats, settings: AlignSettings) -> Floats:
@@ -300,14 +537,12 @@ class _Problem:
     weights: Floats
 
 
-def _searched(
-    problem: _Problem, settings: AlignSettings, clock: _Stages
-) -> tuple[SearchResult, float | None, list[str]]:
+def _searched(problem: _Problem, settings: AlignSettings, clock: _Part) -> tuple[SearchResult, float | None, list[str]]:
     """Search the orientations that the settings ask for; return the one to take, its margin, and warnings."""
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
-        begin = 0.3 + 0.4 * position / len(sides)
+        begin = 0.4 + 0.35 * position / len(sides)
         clock.begin(
             "search reflected" if reflected else "search",
             "Searching the reflection" if reflected else "Searching",
@@ -320,7 +555,7 @@ def _searched(
             weights=problem.weights,
             z_max=settings.z_max,
             time_limit=settings.time_limit,
-            progress=clock.searching(0.4 / len(sides)),
+            progress=clock.searching(0.35 / len(sides)),
         )
         if result.cancelled:
             raise Cancelled
@@ -338,9 +573,9 @@ def _searched(
     return results[chosen], advantage if chosen else -advantage, warnings
 
 
-def _rival(problem: _Problem, winner: SearchResult, settings: AlignSettings, clock: _Stages) -> Rival:
+def _rival(problem: _Problem, winner: SearchResult, settings: AlignSettings, clock: _Part) -> Rival:
     """Look for a transformation that is as good as the winner and maps everything elsewhere."""
-    clock.begin("rival", "Looking for a rival", 0.7)
+    clock.begin("rival", "Looking for a rival", 0.75)
     rival = best_rival(
         problem.source,
         problem.target,
@@ -350,7 +585,7 @@ def _rival(problem: _Problem, winner: SearchResult, settings: AlignSettings, clo
         z_max=settings.z_max,
         close=settings.reflect_margin * len(problem.source),
         time_limit=settings.time_limit,
-        progress=clock.searching(0.1),
+        progress=clock.searching(0.15),
     )
     if rival is None:
         raise Cancelled
@@ -370,22 +605,23 @@ class _Stages:
         self.seconds: dict[str, float] = {}
         self._key, self._text, self._fraction, self._since = "", "", 0.0, 0.0
 
+    def part(self, begin: float, end: float, key: str | None = None) -> _Part:
+        """Return the stages of a part of the work, between shares `begin` and `end`; their times under one `key`."""
+        return _Part(self, begin, end, key)
+
     def begin(self, key: str, text: str, fraction: float) -> None:
         self.end()
         self._key, self._text, self._fraction, self._since = key, text, fraction, time.perf_counter()
-        self._tell(fraction)
+        self.tell(fraction)
 
-    def within(self, begin: float, end: float) -> Callable[[float], None]:
-        """Return what turns shares of the present stage's work into progress; it may raise `Cancelled`."""
-        return lambda share: self._tell(begin + share * (end - begin))
-
-    def _tell(self, fraction: float) -> None:
+    def tell(self, fraction: float) -> None:
         if self.progress is not None and self.progress(Progress(self._text, fraction)) is False:
             raise Cancelled
 
     def end(self) -> None:
         if self._key:
-            self.seconds[self._key] = time.perf_counter() - self._since
+            spent = time.perf_counter() - self._since
+            self.seconds[self._key] = self.seconds.get(self._key, 0.0) + spent
         self._key = ""
 
     def searching(self, share: float) -> Callable[[SearchProgress], bool | None] | None:
@@ -399,3 +635,29 @@ class _Stages:
             return progress(Progress(self._text, fraction, state.value, state.upper_bound, state.nodes))
 
         return report
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The stages of a part of the work: their shares of it become shares of the whole."""
+
+    stages: _Stages
+    first: float
+    last: float
+    key: str | None
+
+    def _whole(self, fraction: float) -> float:
+        return self.first + fraction * (self.last - self.first)
+
+    def part(self, begin: float, end: float, key: str | None = None) -> _Part:
+        return _Part(self.stages, self._whole(begin), self._whole(end), key or self.key)
+
+    def begin(self, key: str, text: str, fraction: float) -> None:
+        self.stages.begin(self.key or key, text, self._whole(fraction))
+
+    def within(self, begin: float, end: float) -> Callable[[float], None]:
+        """Return what turns shares of the present stage's work into progress; it may raise `Cancelled`."""
+        return lambda share: self.stages.tell(self._whole(begin + share * (end - begin)))
+
+    def searching(self, share: float) -> Callable[[SearchProgress], bool | None] | None:
+        return self.stages.searching(share * (self.last - self.first))

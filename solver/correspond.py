@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
+from .agreement import descriptor_distance, log_stretch
 from .align import Alignment
-from .distortion import log_conformal_factor
 from .flatten import Flattening
-from .locate import TriangulatedDisc
 from .mesh import Booleans, Complexes, Floats, Integers
 
 
@@ -56,16 +55,13 @@ def correspond(alignment: Alignment) -> Correspondence:
     that comes to lie in an opening of the source takes the nearest point of its rim, with a confidence of 0.
     """
     source, target = alignment.source, alignment.target
-    size = len(target.disc)
     used = np.flatnonzero(np.isfinite(target.disc.real))
-    disc = TriangulatedDisc.of(source.disc, source.mesh.faces)
-    face = np.full(size, -1)
-    barycentric = np.zeros((size, 3))
-    places = alignment.carried[used]
-    face[used], barycentric[used] = disc.locate(places)
-    confidence = np.zeros(size)
+    face, barycentric = alignment.located
+    confidence = np.zeros(len(target.disc))
     confidence[used] = _confidence(alignment, face[used], barycentric[used], used)
-    confidence[used[in_openings(source, places, face[used], barycentric[used])]] = 0
+    confidence[used[in_openings(source, alignment.carried[used], face[used], barycentric[used])]] = 0
+    if alignment.counterpart is not None:
+        confidence[~alignment.counterpart] = 0
     return Correspondence(
         face=face,
         barycentric=barycentric,
@@ -88,19 +84,16 @@ def in_openings(flattening: Flattening, places: Complexes, face: Integers, baryc
 
 def _confidence(alignment: Alignment, face: Integers, barycentric: Floats, used: Integers) -> Floats:
     """Return the agreement of descriptors and of local scale, in [0, 1], at target vertices `used`."""
-    corners = alignment.source.mesh.faces[face]
-    there = np.einsum("qk,qkd->qd", barycentric, alignment.source_descriptors[corners])
-    difference = there - alignment.target_descriptors[used]
+    if alignment.overlap is not None:
+        parts = alignment.overlap
+        confidence = np.zeros(len(alignment.target.disc))
+        confidence[parts.target.vertices] = correspond(parts.alignment).confidence
+        return confidence[used]
+    distance = descriptor_distance(
+        alignment.source, alignment.source_descriptors, alignment.target_descriptors[used], face, barycentric
+    )
     # two independent descriptors differ by a variance of 2 per component; half the confidence is lost at that distance
-    agreement = np.exp2(-(difference**2).mean(axis=1) / 2)
-    stretch = _log_stretch(alignment, corners, barycentric, used)
+    agreement = np.exp2(-(distance**2) / alignment.source_descriptors.shape[1] / 2)
+    stretch = log_stretch(alignment.source, alignment.target, alignment.carried, face, barycentric, used)
+    stretch -= np.median(stretch)
     return agreement * np.exp2(-((stretch / np.log(3)) ** 2))
-
-
-def _log_stretch(alignment: Alignment, corners: Integers, barycentric: Floats, used: Integers) -> Floats:
-    """Return the log of the length ratio of the map at target vertices, relative to its median, (q,)."""
-    source, target = alignment.source, alignment.target
-    source_factor = log_conformal_factor(source.mesh, source.disc)
-    carried_factor = log_conformal_factor(target.mesh, alignment.carried)[used]
-    log_ratio = np.einsum("qk,qk->q", barycentric, source_factor[corners]) - carried_factor
-    return log_ratio - np.median(log_ratio)

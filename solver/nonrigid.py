@@ -19,6 +19,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
+from .agreement import weighted_median
 from .distortion import signed_areas
 from .flatten import Flattening
 from .harmonic import factorised
@@ -135,6 +136,7 @@ def drafted(
     source: Flattening,
     target: Flattening,
     trust: Floats | None = None,
+    start: Floats | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Draft:
     """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
@@ -151,6 +153,9 @@ def drafted(
     trust : (n,) float64, optional
         How far the Möbius map is to be believed at each target vertex, in (0, 1]: scale, pose and coarse bend are taken
         from where it is. Default: everywhere.
+    start : (n, 3) float64, optional
+        Where target vertices are nearly, in the frame of `Draft.onto`: an earlier draft's `places`. Default: where the
+        Möbius map puts them.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
     """
@@ -169,7 +174,7 @@ def drafted(
     whole = TriangleMesh(target.mesh.vertices * mirror, target.mesh.faces[:, order])
 
     nodes, faces = _coarse(target, NODES, order)
-    places = _positions(conformal[nodes], source, onto)
+    places = _positions(conformal[nodes], source, onto) if start is None else start[nodes]
     believed = np.ones(len(nodes)) if trust is None else trust[nodes]
     unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(unbent[nodes], faces)
@@ -265,17 +270,6 @@ def _growth(mesh: TriangleMesh, places: Floats, trust: Floats) -> float:
     if not some.any():
         return 1.0
     return weighted_median(there[some] / own[some], (trust[i] * trust[j])[some])
-
-
-def weighted_median(values: Floats, weights: Floats) -> float:
-    """Return the value, of (n,), below and above which lies half of the weight, (n,), each.
-
-    >>> weighted_median(np.array([3.0, 1.0, 2.0]), np.array([5.0, 1.0, 1.0]))
-    3.0
-    """
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(total, total[-1] / 2)]])
 
 
 def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integers, Integers]:
