@@ -19,7 +19,7 @@ from .landmarks import usable_landmarks, with_landmarks
 from .locate import TriangulatedDisc
 from .mesh import Booleans, Complexes, Floats, Integers, MeshError, TriangleMesh
 from .mobius import Mobius, hyperbolic_distance
-from .nonrigid import Bending, Draft, drafted, finished
+from .nonrigid import ROUNDS, Bending, Draft, drafted, finished
 from .overlap import Piece, piece, shared
 from .refine import refined
 from .rival import ELSEWHERE, Rival, best_rival
@@ -362,38 +362,46 @@ def _bent(found: Alignment, clock: _Part, landmarks: npt.ArrayLike | None) -> Al
     )
     draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.2))
     here, there = shared(draft, source, target)
-    if max(_left_out(source, here), _left_out(target, there)) <= PARTIAL:
-        bending = finished(draft, source, target, progress=clock.within(0.2, 1.0))
-        return replace(found, bending=bending, counterpart=there)
-    clock.begin("overlap", "Finding the overlap", 0.2)
-    for _ in range(DRAFTS - 1):
-        # pose and scale again, from where the surfaces meet
-        draft = drafted(found.mobius, source, target, np.where(there, 1.0, 1e-3), draft.places(target))
-        before = here, there
-        here, there = shared(draft, source, target)
-        if max(_left_out(source, here == before[0]), _left_out(target, there == before[1])) < SETTLED:
-            break
-    overlap = _overlap(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+    overlap = None
+    if max(_left_out(source, target, here, there)) > PARTIAL:
+        clock.begin("overlap", "Finding the overlap", 0.2)
+        for _ in range(DRAFTS - 1):
+            # pose and scale again, from where the surfaces meet
+            draft = drafted(found.mobius, source, target, np.where(there, 1.0, 1e-3), draft.places(target), ROUNDS)
+            before = here, there
+            here, there = shared(draft, source, target)
+            if max(_left_out(source, target, here == before[0], there == before[1])) < SETTLED:
+                break
+        if max(_left_out(source, target, here, there)) > PARTIAL:
+            overlap = _overlap(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+    warnings = found.warnings
+    missing = _left_out(source, target, here, there)
+    if max(missing) > PARTIAL:
+        apart = " and ".join(
+            f"{100 * share:.0f} % of the {name}"
+            for share, name in zip(missing, ("source", "target"), strict=True)
+            if share > SETTLED
+        )
+        warnings += (f"partial overlap: {apart} without a counterpart on the other surface",)
     if overlap is None:
-        warnings = ("the surfaces seem to share too small a piece: nothing beyond the Möbius map was tried",)
-        return replace(found, counterpart=there, warnings=found.warnings + warnings)
-    apart = [
-        f"{100 * (1 - share):.0f} % of the {name}'s area"
-        for name, share in (("source", overlap.source_share), ("target", overlap.target_share))
-        if share < 1 - SETTLED
-    ]
-    warnings = [f"partial overlap: {' and '.join(apart)} without a counterpart on the other surface"]
+        clock.begin("bend", "Bending", 0.5)
+        bending = finished(draft, source, target, progress=clock.within(0.5, 1.0))
+        return replace(found, bending=bending, counterpart=there, warnings=warnings)
     # what the whole discs left open the pieces may decide
-    warnings += [said for said in found.warnings if not said.startswith("ambiguous: ")]
-    warnings += [f"in the overlap: {said}" for said in overlap.alignment.warnings]
+    warnings = tuple(said for said in warnings if not said.startswith("ambiguous: "))
+    warnings += tuple(f"in the overlap: {said}" for said in overlap.alignment.warnings)
     counterpart = np.zeros(len(target.disc), bool)
     counterpart[overlap.target.vertices] = overlap.alignment.counterpart
-    return replace(found, overlap=overlap, counterpart=counterpart, warnings=tuple(warnings))
+    return replace(found, overlap=overlap, counterpart=counterpart, warnings=warnings)
 
 
-def _left_out(flattening: Flattening, kept: Booleans) -> float:
-    """Return the share of the area around vertices that are not kept, (n,)."""
-    return float(flattening.mesh.vertex_areas[~kept].sum() / flattening.mesh.area)
+def _left_out(source: Flattening, target: Flattening, here: Booleans, there: Booleans) -> tuple[float, float]:
+    """Return the shares of the surfaces' areas around vertices that are not `here`, and not `there`."""
+    first, second = (
+        float(surface.mesh.vertex_areas[~kept].sum() / surface.mesh.area)
+        for surface, kept in ((source, here), (target, there))
+    )
+    return first, second
 
 
 def _overlap(
@@ -404,7 +412,7 @@ def _overlap(
     clock: _Part,
     landmarks: npt.ArrayLike | None,
 ) -> Overlap | None:
-    """Align the parts that the surfaces share, beginning at a draft of the whole; None where there is hardly any."""
+    """Align the parts that the surfaces seem to share, by a draft of the whole; None if it was mistaken."""
     if source_part is None or target_part is None:
         return None
     source_share = source_part.mesh.area / found.source.mesh.area
@@ -423,6 +431,8 @@ def _overlap(
         inner = _matched(source_part.mesh, target_part.mesh, settings, clock.part(0.2, 0.5, "overlap"), pairs)
     except MeshError:  # too small a piece to flatten
         return None
+    if _share(inner) <= _share(found):
+        return None  # what matches less by itself is no better founded
     used = np.flatnonzero(np.isfinite(found.target.disc.real))
     places = draft.places(found.target)
     normals = TriangleMesh(places, draft.whole.faces).vertex_normals()
@@ -445,6 +455,11 @@ def _overlap(
     )
     inner = replace(inner, bending=bending, counterpart=there)
     return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
+
+
+def _share(found: Alignment) -> float:
+    """Return the share of the samples that match."""
+    return found.search.value / len(found.source_samples)
 
 
 def _within(landmarks: npt.ArrayLike | None, source: Piece, target: Piece) -> Integers | None:

@@ -62,6 +62,9 @@ BEND_LENGTH = 0.15
 """Width over which the rotations of the target's surroundings are averaged: half the radius of a sheet rolled
 half around, which must remain possible, and wide enough not to follow the Möbius map's errors."""
 
+NEAR_BEND_LENGTH = 0.05
+"""The same where it starts from a draft, whose errors are a third of the Möbius map's."""
+
 POSE_ROUNDS = 10
 """Closest point rounds that improve the pose before anything bends."""
 
@@ -137,6 +140,7 @@ def drafted(
     target: Flattening,
     trust: Floats | None = None,
     start: Floats | None = None,
+    rounds: int = DRAFT_ROUNDS,
     progress: Callable[[float], None] | None = None,
 ) -> Draft:
     """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
@@ -156,6 +160,8 @@ def drafted(
     start : (n, 3) float64, optional
         Where target vertices are nearly, in the frame of `Draft.onto`: an earlier draft's `places`. Default: where the
         Möbius map puts them.
+    rounds : int
+        At most `ROUNDS`: how far the plate is relaxed.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
     """
@@ -178,9 +184,9 @@ def drafted(
     believed = np.ones(len(nodes)) if trust is None else trust[nodes]
     unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(unbent[nodes], faces)
-    rest = _turned_like(flat, places, believed)
+    rest = _turned_like(flat, places, believed, BEND_LENGTH if start is None else NEAR_BEND_LENGTH)
     rest = _in_pose(TriangleMesh(rest, faces), onto)
-    lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:DRAFT_ROUNDS]
+    lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = _relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
     return Draft(onto, whole, conformal, unbent, nodes, flat, rest, now)
 
@@ -297,21 +303,26 @@ def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integ
     return nodes[held], place.reshape(-1, 3)[:, order]
 
 
-def _smooth_rotations(rest: TriangleMesh, now: Floats, trust: Floats | None = None) -> Floats:
-    """Return the rotation, (n, 3, 3), that carries the surroundings of each vertex of `rest` to those in `now`."""
+def _smooth_rotations(
+    rest: TriangleMesh, now: Floats, trust: Floats | None = None, length: float = BEND_LENGTH
+) -> Floats:
+    """Return the rotation, (n, 3, 3), that carries the surroundings of each vertex of `rest` to those in `now`.
+
+    Averaged over `length`, by trust, (n,).
+    """
     stiffness = laplacian(rest)
     i, j = rest.edges.T
     trust = np.ones(len(now)) if trust is None else trust
     weight = np.maximum(-np.asarray(stiffness[i, j]).ravel(), 0) * np.sqrt(trust[i] * trust[j])
     products = weight[:, None, None] * (now[i] - now[j])[:, :, None] * (rest.vertices[i] - rest.vertices[j])[:, None, :]
     total = _summed(i, products, len(now)) + _summed(j, products, len(now))
-    average = factorised(csc_array(diags_array(rest.vertex_areas * trust) + BEND_LENGTH**2 * stiffness))
+    average = factorised(csc_array(diags_array(rest.vertex_areas * trust) + length**2 * stiffness))
     u, _, v = np.linalg.svd(average(total.reshape(-1, 9)).reshape(-1, 3, 3))
     u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
     return np.asarray(u @ v, np.float64)
 
 
-def _turned_like(rest: TriangleMesh, places: Floats, trust: Floats, rounds: int = 3) -> Floats:
+def _turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: float, rounds: int = 3) -> Floats:
     """Return `rest` with its surroundings turned as in `places`, as far as these are trusted, and its own lengths."""
     stiffness, areas = laplacian(rest), rest.vertex_areas * trust
     i, j = rest.edges.T
@@ -321,7 +332,7 @@ def _turned_like(rest: TriangleMesh, places: Floats, trust: Floats, rounds: int 
     solve = factorised(csc_array(stiffness + diags_array(areas)))
     now = places
     for _ in range(rounds):
-        turn = _smooth_rotations(rest, now, trust)
+        turn = _smooth_rotations(rest, now, trust, length)
         wanted = weight[:, None] * np.einsum("eij,ej->ei", (turn[i] + turn[j]) / 2, side)
         now = solve(_summed(i, wanted, len(now)) - _summed(j, wanted, len(now)) + areas[:, None] * places)
     return now

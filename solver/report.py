@@ -13,9 +13,11 @@ from .mobius import Mobius
 def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, Any]:
     """Return the figures of an alignment as JSON-ready data: what was matched, what is proved, how long it took.
 
-    `coverage` is the share of the target's area whose vertices are matched.
+    `coverage` is the share of the target's area whose vertices are matched. `value` to `rival` are about the whole
+    discs, `overlap` about the parts that both surfaces show, where these are less; `rival_margin` is the latter's then.
     """
-    found, areas = alignment.search, alignment.target.mesh.vertex_areas
+    found, areas, parts = alignment.search, alignment.target.mesh.vertex_areas, alignment.overlap
+    decisive = alignment if parts is None else parts.alignment
     return {
         "source": alignment.source.mesh.name,
         "target": alignment.target.mesh.name,
@@ -33,8 +35,19 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "rival": None
         if alignment.rival is None
         else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
-        "rival_margin": alignment.rival_margin,
-        "vertices_unfolded": None if alignment.bending is None else alignment.bending.repaired,
+        "rival_margin": decisive.rival_margin,
+        "overlap": None
+        if parts is None
+        else {
+            "source_share": parts.source_share,
+            "target_share": parts.target_share,
+            "value": decisive.search.value,
+            "upper_bound": decisive.search.upper_bound,
+            "certified": decisive.search.certified,
+            "samples": len(decisive.source_samples),
+            "matches": len(decisive.search.matches),
+        },
+        "vertices_unfolded": None if decisive.bending is None else decisive.bending.repaired,
         "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},

@@ -1,0 +1,154 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scans import bumps, mirrored, percent, places, posed, remeshed
+from surfaces import planar, rings
+
+from solver import AlignSettings, TriangleMesh, align, correspond, flatten, topology
+from solver.distortion import signed_areas
+from solver.overlap import depth_beyond, piece
+from solver.surface_points import SurfacePoints
+
+SMALL = AlignSettings(samples=60, targets=400, reflect="never")
+
+
+def cropped(mesh: TriangleMesh, direction: float, share: float) -> tuple[TriangleMesh, np.ndarray]:
+    """The mesh without the `share` of its area that lies farthest in a direction of the plane, and its old vertices."""
+    height = mesh.vertices[:, :2] @ [np.cos(direction), np.sin(direction)]
+    order = np.argsort(-height)
+    kept = np.ones(len(height), bool)
+    kept[order[np.cumsum(mesh.vertex_areas[order]) < share * mesh.area]] = False
+    part = piece(flatten(mesh), kept)
+    assert part is not None
+    return part.mesh, part.vertices
+
+
+@given(st.integers(0, 10**6), st.floats(0.02, 0.9))
+@settings(max_examples=40, deadline=None)
+def test_a_piece_is_a_disc_of_the_wanted_vertices(seed, level):
+    """Whatever is left out: islands, holes, strips, corners that merely touch."""
+    rng = np.random.default_rng(seed)
+    whole = flatten(planar(rings(8, jitter=0.2, seed=seed)))
+    place = whole.mesh.vertices[:, :2] @ [1, 1j]
+    waves = sum(np.cos((place * np.conj(rng.normal(size=2) @ [4, 4j])).real + rng.uniform(0, 7)) for _ in range(3))
+    kept = waves > np.quantile(waves, level)
+    part = piece(whole, kept)
+    if part is None:
+        assert not kept[whole.mesh.faces].all(axis=1).any()
+        return
+    found = topology(part.mesh)
+    assert found.parts == 1
+    assert len(found.boundary_loops) == 1
+    assert len(found.non_manifold_vertices) == 0
+    assert np.array_equal(part.mesh.vertices, whole.mesh.vertices[part.vertices])
+    assert np.array_equal(part.vertices[part.mesh.faces], whole.mesh.faces[part.faces])
+    rim = np.zeros(len(part.vertices), bool)
+    rim[found.boundary_loops[0]] = True
+    assert rim[part.outer]
+    assert not (part.cut & ~rim).any()
+    assert (part.cut | np.isin(part.vertices, whole.boundary))[rim].all()
+
+
+def test_a_piece_of_everything_is_everything():
+    whole = flatten(planar(rings(5)))
+    part = piece(whole, np.ones(len(whole.disc), bool))
+    assert part is not None
+    assert np.array_equal(part.faces, np.arange(len(whole.mesh.faces)))
+    assert not part.cut.any()
+
+
+def test_openings_of_a_piece_stay_open():
+    mesh = planar(rings(8))
+    place = mesh.vertices[:, :2] @ [1, 1j]
+    opened = TriangleMesh(mesh.vertices, mesh.faces[(np.abs(place[mesh.faces] - 0.3) > 0.15).all(axis=1)])
+    part = piece(flatten(opened, fill_holes=True), place.real > -0.4)
+    assert part is not None
+    assert len(topology(part.mesh).boundary_loops) == 2
+    assert part.cut.sum() > 3
+
+
+def test_depth_is_measured_along_the_surface():
+    mesh = planar(rings(10))
+    surface = SurfacePoints(mesh, (flatten(mesh).boundary,), 0.03)
+    points = np.array([[0, 0, 0], [0.2, 0.1, 0.3], [1.5, 0, 0], [0, -1.2, 0.4]])
+    depth = depth_beyond(points, np.tile([0.0, 0, 1], (4, 1)), surface)
+    assert depth == pytest.approx([0, 0, 0.5, 0.2], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("source_cut", "target_cut", "reflected"),
+    [(0.05, 0.0, False), (0.3, 0.0, False), (0.0, 0.3, True), (0.08, 0.08, False)],
+)
+def test_where_each_shows_more_than_the_other_the_rest_is_right(source_cut, target_cut, reflected):
+    """Each sheet cut at another side: right where both are, unmatched where there is no counterpart, and said."""
+    sheet = bumps(2500, seed=1)
+    source, here = cropped(sheet, 0.4, source_cut)
+    target, there = cropped(sheet, 2.9, target_cut)
+    target, kept = remeshed(posed(mirrored(target) if reflected else target, 2), 0.7, 3)
+    chosen = AlignSettings(samples=60, targets=400, reflect="always") if reflected else SMALL
+    alignment = align(source, target, chosen)
+    found = correspond(alignment)
+    vertex = there[kept]
+    has = np.isin(vertex, here)
+    error = percent(places(found, source), sheet.vertices[vertex], sheet)
+    assert error[has].mean() < 0.3
+    assert found.matched[has].mean() > 0.93
+    if not has.all():
+        assert found.matched[~has].mean() < 0.15
+    assert any(warning.startswith("partial overlap: ") for warning in alignment.warnings)
+    if max(source_cut, target_cut) < 0.1:
+        return
+    overlap = alignment.overlap
+    assert overlap is not None
+    assert overlap.alignment.search.certified
+    common = sheet.vertex_areas[np.intersect1d(here, there)].sum()
+    assert overlap.source_share * source.area == pytest.approx(common, rel=0.05)
+    assert overlap.target_share * (1 - target_cut) == pytest.approx(common / sheet.area, rel=0.05)
+    inner = overlap.alignment
+    areas = signed_areas(inner.carried, inner.target.mesh.faces)
+    assert ((areas < 0) if reflected else (areas > 0)).all()
+    assert np.isfinite(alignment.carried).all()
+    assert (np.abs(alignment.carried) <= 1 + 1e-9).all()
+
+
+def test_bent_sheets_may_overlap_in_part():
+    """Rolled up by 150 degrees, and the flat one cropped: no rigid pose fits, and yet it is seen what is missing."""
+    flat, rolled = bumps(2500, seed=1), bumps(2500, seed=1, bend=2.6)
+    source, here = cropped(flat, 0.4, 0.15)
+    alignment = align(source, posed(rolled, 9), SMALL)
+    found = correspond(alignment)
+    has = np.isin(np.arange(len(rolled.vertices)), here)
+    assert percent(places(found, source), flat.vertices, flat)[has].mean() < 1
+    assert found.matched[~has].mean() < 0.15
+    assert found.matched[has].mean() > 0.9
+
+
+def test_surfaces_that_show_the_same_are_left_whole():
+    """Though the boundary of one is ragged."""
+    sheet = bumps(2500, seed=1)
+    rng = np.random.default_rng(0)
+    kept = np.ones(len(sheet.vertices), bool)
+    rim = flatten(sheet).boundary
+    kept[rng.choice(rim, len(rim) // 3, replace=False)] = False
+    part = piece(flatten(sheet), kept)
+    assert part is not None
+    alignment = align(part.mesh, posed(sheet, 2), SMALL)
+    assert alignment.overlap is None
+    assert alignment.bending is not None
+    assert not any("partial" in warning for warning in alignment.warnings)
+
+
+def test_a_cropped_face_is_found_on_another_persons(real_mesh):
+    """The lower 15 % of one face cut off, the other posed and remeshed."""
+    source, other = (real_mesh(f"faces_simpop/SIMPOP_{number}.obj") for number in ("01", "10"))
+    height = source.vertices[:, 1]
+    part = piece(flatten(source), height > np.quantile(height, 0.15))
+    assert part is not None
+    target, vertex = remeshed(posed(other, 1), 0.7, 2)
+    alignment = align(part.mesh, target, AlignSettings(reflect="never"))
+    found = correspond(alignment)
+    has = np.isin(vertex, part.vertices)
+    assert percent(places(found, part.mesh), source.vertices[vertex], source)[has].mean() < 0.5
+    assert found.matched[~has].mean() < 0.1
+    assert found.matched[has].mean() > 0.95
