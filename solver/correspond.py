@@ -42,10 +42,10 @@ class Correspondence:
 
     def matrix(self) -> csr_array:
         """Return the sparse (n_target, n_source) matrix that carries values at source vertices; rows sum to 1, or 0."""
-        has = np.flatnonzero(self.face >= 0)
-        rows = np.repeat(has, 3)
-        columns = self.source_triangles[self.face[has]].ravel()
-        return csr_array((self.barycentric[has].ravel(), (rows, columns)), shape=(len(self.face), self.source_size))
+        known = self.face >= 0
+        columns = self.source_triangles[self.face[known]].ravel()
+        ends = np.concatenate([[0], 3 * np.cumsum(known)])
+        return csr_array((self.barycentric[known].ravel(), columns, ends), shape=(len(self.face), self.source_size))
 
 
 def correspond(alignment: Alignment) -> Correspondence:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .correspond import Correspondence
 from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
+from .surface_points import nearest_in_triangle
 
 _REACH = 4.0
 """How much faster than at the two ends a value may change between two points of one side of a seam."""
@@ -75,11 +77,12 @@ class Charts:
     slit: Booleans
 
     @staticmethod
-    def of(triangles: Integers, corner_values: Floats) -> Charts:
-        """Find the charts of values, (3 m, d), at the corners of triangles, (m, 3)."""
+    def of(triangles: Integers, corner_values: Floats, twin: Integers | None = None) -> Charts:
+        """Find the charts of values, (3 m, d), at the corners of triangles, (m, 3); `twin` is `twin_sides` of them."""
         size, vertex_count = len(triangles), int(triangles.max()) + 1
         values = corner_values.reshape(size, 3, -1)
-        twin = twin_sides(edges_of_sides(triangles, vertex_count)[1])
+        if twin is None:
+            twin = twin_sides(edges_of_sides(triangles, vertex_count)[1])
         side = np.flatnonzero(twin > np.arange(len(twin)))
         other = twin[side]
         corners = np.arange(3 * size).reshape(size, 3)
@@ -117,6 +120,107 @@ class Charts:
         return corner[start[row] + offset], row
 
 
+@dataclass(frozen=True, eq=False)
+class CornerInterpolation:
+    """Carries values at the corners of source triangles to the corners of target triangles.
+
+    All corners of a group take their values from one side of every seam of the source: the side that the group's anchor
+    lies on, the middle of its largest triangle. A corner that lies beyond the seam takes the value at the seam, so that
+    no value is a mean of two sides and no triangle is stretched from one to the other. Between two sides that hang
+    together elsewhere (a slit in one island) a side ends where the value leaves the anchor's faster than it can.
+
+    Attributes
+    ----------
+    correspondence : Correspondence
+    source_vertices : (n_source, 3) float64
+        Positions, to find what is nearest.
+    target_triangles : (mt, 3) int
+    groups : (mt,) int
+        Which target triangles stay together, as the triangles of one polygon: numbers from 0.
+    """
+
+    correspondence: Correspondence
+    source_vertices: Floats
+    target_triangles: Integers
+    groups: Integers
+
+    def __call__(self, source_corner_values: npt.ArrayLike) -> tuple[Floats, Integers, Floats]:
+        """Carry values, (3 ms, d), in the order of `correspondence.source_triangles`.
+
+        Returns
+        -------
+        at_vertex : (n_target, d) float64
+            The value of every corner at a vertex, but for those that follow; 0 where there is no counterpart.
+        corners : (c,) int
+            Corners, 3 t + 0, 1 or 2, of triangles beside a seam.
+        values : (c, d) float64
+            The values of these.
+        """
+        triangles = self.correspondence.source_triangles
+        given = np.asarray(source_corner_values, dtype=np.float64).reshape(3 * len(triangles), -1)
+        charts = Charts.of(triangles, given, self._twin)
+        face, weights = self.correspondence.face, self.correspondence.barycentric
+        at_vertex = np.zeros((len(face), given.shape[1]))
+        for k in range(3):  # weights are 0 where there is no face
+            at_vertex += weights[:, k, None] * given[3 * face + k]
+        beside = self._groups_near_seams(charts)
+        chosen = np.flatnonzero(beside[self.groups]) if beside.any() else np.zeros(0, np.intp)
+        corner_vertex = self.target_triangles[chosen].ravel()
+        known = face[corner_vertex] >= 0
+        corners = (3 * chosen[:, None] + np.arange(3)).ravel()[known]
+        if len(corners) == 0:
+            return at_vertex, corners, np.zeros((0, given.shape[1]))
+        group = np.repeat(np.unique(self.groups[chosen], return_inverse=True)[1].reshape(-1), 3)
+        place = self._place[corner_vertex].reshape(-1, 3, 3)
+        middle, rank = _middles(place, known.reshape(-1, 3), group[::3])
+        own_face = face[corner_vertex]
+        anchor_face, anchor_value = _anchors(charts, self.source_vertices, middle, rank, own_face.reshape(-1, 3))
+        its = group[known]
+        values = _on_side_of_anchor(
+            charts, self.source_vertices, own_face[known], weights[corner_vertex[known]], place.reshape(-1, 3)[known],
+            anchor_face[its], anchor_value[its], middle[its],
+        )  # fmt: skip
+        return at_vertex, corners, values
+
+    @cached_property
+    def _twin(self) -> Integers:
+        triangles = self.correspondence.source_triangles
+        return twin_sides(edges_of_sides(triangles, int(triangles.max()) + 1)[1])
+
+    @cached_property
+    def _place(self) -> Floats:
+        return _places(self.correspondence, self.source_vertices)[1]
+
+    @cached_property
+    def _circles(self) -> tuple[Floats, Floats]:
+        """Centroid, (mt, 3), of each target triangle's place, and how far its corners lie from there, (mt,)."""
+        corners = [self._place[self.target_triangles[:, k]] for k in range(3)]
+        centre = (corners[0] + corners[1] + corners[2]) / 3
+        square = np.max([((corner - centre) ** 2).sum(axis=1) for corner in corners], axis=0)
+        return centre, np.sqrt(square)
+
+    def _groups_near_seams(self, charts: Charts) -> Booleans:
+        """Return which groups, (g,), lie on a seam, across one or beside a slit."""
+        result = np.zeros(int(self.groups.max()) + 1, bool)
+        if not charts.seam.any():
+            return result
+        face = self.correspondence.face
+        known = face >= 0
+        touching = known & charts.seam[charts.triangles].any(axis=1)[face]
+        island = np.where(known, charts.island[face], -1)
+        a, b, c = (island[self.target_triangles[:, k]] for k in range(3))
+        across = ((a != b) & (a >= 0) & (b >= 0)) | ((b != c) & (b >= 0) & (c >= 0)) | ((c != a) & (c >= 0) & (a >= 0))
+        result[self.groups[touching[self.target_triangles].any(axis=1) | across]] = True
+        if charts.slit.any():
+            centre, radius = self._circles
+            rest = np.flatnonzero(~result[self.groups] & known[self.target_triangles].all(axis=1))
+            if len(rest):
+                tree = KDTree(self.source_vertices[np.flatnonzero(charts.slit)])
+                distance = tree.query(centre[rest], distance_upper_bound=radius[rest].max())[0]
+                result[self.groups[rest[distance < radius[rest]]]] = True
+        return result
+
+
 def interpolate_corners(
     correspondence: Correspondence,
     source_vertices: Floats,
@@ -126,51 +230,15 @@ def interpolate_corners(
 ) -> Floats:
     """Return values at the corners of target triangles, (3 mt, d), from values at the corners of source triangles.
 
-    All corners of a group take their values from one side of every seam of the source: the side that the group's anchor
-    lies on, the middle of its largest triangle. A corner that lies beyond the seam takes the value at the seam, so that
-    no value is a mean of two sides and no triangle is stretched from one to the other. Between two sides that hang
-    together elsewhere (a slit in one island) a side ends where the value leaves the anchor's faster than it can.
-
-    Parameters
-    ----------
-    correspondence : Correspondence
-    source_vertices : (n_source, 3) float64
-        Positions, to find what is nearest.
-    source_corner_values : (3 ms, d) float
-        In the order of `correspondence.source_triangles`.
-    target_triangles : (mt, 3) int
-    groups : (mt,) int, optional
-        Which target triangles stay together, as the triangles of one polygon: numbers from 0. By default each is alone.
-
-    Returns
-    -------
-    (3 mt, d) float64
-        0 at corners whose vertex has no counterpart.
+    Arguments as for `CornerInterpolation`; by default each triangle is a group of its own. 0 at corners whose vertex
+    has no counterpart.
     """
-    triangles = correspondence.source_triangles
-    given = np.asarray(source_corner_values, dtype=np.float64).reshape(3 * len(triangles), -1)
-    charts = Charts.of(triangles, given)
-    corner_vertex = target_triangles.ravel()
-    face, weights = correspondence.face[corner_vertex], correspondence.barycentric[corner_vertex]
-    known = face >= 0
-    values = np.einsum("qk,qkd->qd", weights, charts.values[face])
-    values[~known] = 0
-    if not charts.seam.any():
-        return values
-    group = np.repeat(np.arange(len(target_triangles)) if groups is None else groups, 3)
-    place = np.einsum("qk,qkd->qd", weights, source_vertices[triangles[face]])
-    middle, rank = _middles(place.reshape(-1, 3, 3), known.reshape(-1, 3), group[::3])
-    near_seam = _groups_near_seams(charts, source_vertices, face, known, place, middle, group)
-    chosen = np.flatnonzero(known & near_seam[group])
-    if len(chosen) == 0:
-        return values
-    anchor_face, anchor_value = _anchors(charts, source_vertices, middle, rank, face.reshape(-1, 3), near_seam)
-    its = group[chosen]
-    values[chosen] = _on_side_of_anchor(
-        charts, source_vertices, face[chosen], weights[chosen], place[chosen],
-        anchor_face[its], anchor_value[its], middle[its],
-    )  # fmt: skip
-    return values
+    alone = np.arange(len(target_triangles)) if groups is None else groups
+    carry = CornerInterpolation(correspondence, source_vertices, target_triangles, alone)
+    at_vertex, corners, values = carry(source_corner_values)
+    result = at_vertex[target_triangles.ravel()]
+    result[corners] = values
+    return result
 
 
 def source_of_faces(
@@ -261,32 +329,72 @@ def local_similarities(
     The scale is the ratio of the lengths of those sides. Both are the identity where nothing is known.
     """
     face, place = _places(correspondence, source.vertices)
-    sides = directed_edges(target.faces)
-    sides = sides[(face[sides] >= 0).all(axis=1)]
-    there = place[sides[:, 1]] - place[sides[:, 0]]
-    here = target.vertices[sides[:, 1]] - target.vertices[sides[:, 0]]
+    edges = target.edges
+    edges = edges[(face[edges] >= 0).all(axis=1)]
+    there = place[edges[:, 1]] - place[edges[:, 0]]
+    here = target.vertices[edges[:, 1]] - target.vertices[edges[:, 0]]
     size = len(face)
-    ends = sides.T.ravel()
-    gather = coo_array(
-        (np.ones(len(ends)), (ends, np.tile(np.arange(len(sides)), 2))), shape=(size, len(sides))
-    ).tocsr()
+    gather = csr_array(
+        (np.ones(2 * len(edges)), (edges.ravel(), np.repeat(np.arange(len(edges)), 2))), shape=(size, len(edges))
+    )
     product = (gather @ (here[:, :, None] * there[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
-    there_square, here_square = (gather @ np.einsum("ed,ed->e", x, x) for x in (there, here))
+    there_square, here_square = (gather @ (x**2).sum(axis=1) for x in (there, here))
     there_normal = interpolate(correspondence, source.vertex_normals())
     there_normal /= np.maximum(np.linalg.norm(there_normal, axis=1, keepdims=True), 1e-300)
-    weight = np.sqrt(there_square * here_square)[:, None, None]
-    product += weight * target.vertex_normals()[:, :, None] * there_normal[:, None, :]
-    product[weight[:, 0, 0] == 0] = np.eye(3)
-    left, _, right = np.linalg.svd(product)
-    handed = np.sign(np.linalg.det(left @ right))
-    mirrored = np.sign(handed[weight[:, 0, 0] > 0].sum() or 1)
-    left[handed != mirrored, :, 2] *= -1
-    rotation = left @ right
-    rotation[weight[:, 0, 0] == 0] = np.eye(3)
+    weight = np.sqrt(there_square * here_square)
+    known = weight > 0
+    product += weight[:, None, None] * target.vertex_normals()[:, :, None] * there_normal[:, None, :]
+    rotation = np.broadcast_to(np.eye(3), (size, 3, 3)).copy()
+    rotation[known] = nearest_orthogonal(product[known] / weight[known, None, None])
     scale = np.ones(size)
-    known = (there_square > 0) & (here_square > 0)
     scale[known] = np.sqrt(here_square[known] / there_square[known])
     return rotation, scale
+
+
+def nearest_orthogonal(matrices: Floats) -> Floats:
+    """Return the orthogonal matrices nearest to some, (n, 3, 3), all rotations or all reflections, as most are.
+
+    The orthogonal factor of the polar decomposition by Newton's iteration (Higham 1986), for all matrices at once;
+    where that is of the other kind or badly determined, from the singular values, the smallest of which changes sign
+    (Kabsch 1976).
+    """
+    if len(matrices) == 0:
+        return matrices
+    factor = matrices.copy()
+    sign = np.sign(_determinants(factor))
+    wanted = np.sign(sign.sum() or 1)
+    lengths = np.sqrt((factor**2).sum(axis=(1, 2)))
+    odd = (sign != wanted) | (np.abs(_determinants(factor)) < 1e-6 * lengths**3)
+    factor[odd] = np.eye(3)
+    for _ in range(30):
+        inverse = _inverse_transposes(factor)
+        balance = np.sqrt(np.sqrt((inverse**2).sum(axis=(1, 2)) / (factor**2).sum(axis=(1, 2))))[:, None, None]
+        step = 0.5 * (balance * factor + inverse / balance)
+        change = np.abs(step - factor).max()
+        factor = step
+        if change < 1e-15:
+            break
+    left, _, right = np.linalg.svd(matrices[odd])
+    left[np.sign(np.linalg.det(left @ right)) != wanted, :, 2] *= -1
+    factor[odd] = left @ right
+    return factor
+
+
+def _inverse_transposes(matrices: Floats) -> Floats:
+    """Return the inverse of the transpose of each of some regular matrices, (n, 3, 3): cofactors by determinant."""
+    a, b, c = matrices[:, 0], matrices[:, 1], matrices[:, 2]
+    cofactors = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
+    return cofactors / np.einsum("nd,nd->n", a, cofactors[:, 0])[:, None, None]
+
+
+def _determinants(matrices: Floats) -> Floats:
+    return np.einsum("nd,nd->n", matrices[:, 0], _cross(matrices[:, 1], matrices[:, 2]))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return cross products, (n, 3), in a third of the time of np.cross."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _labels(size: int, left: Integers, right: Integers) -> Integers:
@@ -306,36 +414,11 @@ def _middles(place: Floats, known: Booleans, group: Integers) -> tuple[Floats, I
     return np.einsum("gk,gkd->gd", share, place[triangle]), triangle
 
 
-def _groups_near_seams(
-    charts: Charts,
-    vertices: Floats,
-    face: Integers,
-    known: Booleans,
-    place: Floats,
-    middle: Floats,
-    group: Integers,
-) -> Booleans:
-    """Return which groups, (g,), lie on a seam, across one or beside a slit."""
-    result = np.zeros(len(middle), bool)
-    rows = np.flatnonzero(known)
-    result[group[rows[charts.seam[charts.triangles[face[rows]]].any(axis=1)]]] = True
-    lowest, highest = np.full(len(middle), len(charts.island)), np.full(len(middle), -1)
-    np.minimum.at(lowest, group[rows], charts.island[face[rows]])
-    np.maximum.at(highest, group[rows], charts.island[face[rows]])
-    result |= lowest < highest
-    if charts.slit.any():
-        radius = np.zeros(len(middle))
-        np.maximum.at(radius, group[rows], np.linalg.norm(place[rows] - middle[group[rows]], axis=1))
-        distance = KDTree(vertices[np.flatnonzero(charts.slit)]).query(middle)[0]
-        result |= distance < radius
-    return result
-
-
 def _anchors(
-    charts: Charts, vertices: Floats, middle: Floats, rank: Integers, face: Integers, wanted: Booleans
+    charts: Charts, vertices: Floats, middle: Floats, rank: Integers, face: Integers
 ) -> tuple[Integers, Floats]:
-    """Return the source triangle nearest to each wanted group's middle, (g,), and the value there, (g, d)."""
-    groups = np.flatnonzero(wanted & (rank >= 0))
+    """Return the source triangle nearest to each group's middle, (g,), and the value there, (g, d)."""
+    groups = np.flatnonzero(rank >= 0)
     best, weights = _nearest_triangles(vertices[charts.triangles], middle[groups], face[rank[groups]])
     anchor, value = np.full(len(middle), -1), np.zeros((len(middle), charts.values.shape[2]))
     anchor[groups], value[groups] = best, np.einsum("qk,qkd->qd", weights, charts.values[best])
@@ -345,43 +428,39 @@ def _anchors(
 def _nearest_triangles(corners: Floats, query: Floats, guesses: Integers) -> tuple[Integers, Floats]:
     """Return the triangle of (m, 3, 3) nearest to each query, (q,), and the barycentric coordinates, (q, 3), in it.
 
-    Tried are the guesses, (q, h), -1 for none, and the triangles whose middles are nearest.
+    Tried are the guesses, (q, h), -1 for none, and the triangles whose middles are nearest, up to twelve, until no
+    further one can be nearer.
     """
-    k = min(12, len(corners))
-    near = KDTree(corners.mean(axis=1)).query(query, k=k)[1].reshape(len(query), k)
-    candidates = np.concatenate([near, np.where(guesses < 0, near[:, :1], guesses)], axis=1)
-    best, best_distance = candidates[:, 0].copy(), np.full(len(query), np.inf)
+    centre = corners.mean(axis=1)
+    size = np.sqrt(((corners - centre[:, None]) ** 2).sum(axis=2).max())
+    best, best_distance = np.full(len(query), -1), np.full(len(query), np.inf)
     best_weights = np.zeros((len(query), 3))
-    for column in candidates.T:
-        weights = _nearest_weights(corners[column], query)
-        distance = np.linalg.norm(np.einsum("qk,qkd->qd", weights, corners[column]) - query, axis=1)
-        nearer = distance < best_distance
-        best[nearer], best_distance[nearer] = column[nearer], distance[nearer]
-        best_weights[nearer] = weights[nearer]
+
+    def attempt(rows: Integers, triangle: Integers) -> None:
+        weights = nearest_in_triangle(query[rows], corners[triangle])
+        distance = np.linalg.norm(np.einsum("qk,qkd->qd", weights, corners[triangle]) - query[rows], axis=1)
+        nearer = distance < best_distance[rows]
+        rows = rows[nearer]
+        best[rows], best_distance[rows], best_weights[rows] = triangle[nearer], distance[nearer], weights[nearer]
+
+    for k in range(guesses.shape[1]):
+        rows = np.flatnonzero((guesses[:, k] >= 0) & (guesses[:, k] != best))
+        attempt(rows, guesses[rows, k])
+    open_rows = np.flatnonzero(best_distance > 1e-12 * size)
+    tree = KDTree(centre) if len(open_rows) else None
+    first = 0
+    for count in (4, 12):
+        if tree is None or len(open_rows) == 0 or first >= len(centre):
+            break
+        count = min(count, len(centre))
+        away, near = (x.reshape(len(open_rows), count) for x in tree.query(query[open_rows], k=count))
+        for k in range(first, count):
+            # a triangle reaches no further from its middle than `size`
+            can = best_distance[open_rows] > away[:, k] - size
+            open_rows, away, near = open_rows[can], away[can], near[can]
+            attempt(open_rows, near[:, k])
+        first = count
     return best, best_weights
-
-
-def _nearest_weights(corners: Floats, query: Floats) -> Floats:
-    """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, 3), nearest to a query, (q, 3)."""
-    u, v, w = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], query - corners[:, 0]
-    uu, uv, vv, uw, vw = (np.einsum("qd,qd->q", a, b) for a, b in ((u, u), (u, v), (v, v), (u, w), (v, w)))
-    area = uu * vv - uv**2
-    second = np.divide(vv * uw - uv * vw, area, out=np.full(len(u), -1.0), where=area > 0)
-    third = np.divide(uu * vw - uv * uw, area, out=np.full(len(u), -1.0), where=area > 0)
-    weights = np.stack([1 - second - third, second, third], axis=1)
-    outside = (weights < 0).any(axis=1)
-    best = np.where(outside, np.inf, 0.0)
-    for k in range(3):
-        start, side = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
-        square = np.einsum("qd,qd->q", side, side)
-        along = np.einsum("qd,qd->q", side, query - start)
-        along = np.clip(np.divide(along, square, out=np.zeros(len(u)), where=square > 0), 0, 1)
-        distance = np.linalg.norm(start + along[:, None] * side - query, axis=1)
-        nearer = distance < best
-        best[nearer] = distance[nearer]
-        weights[nearer] = 0
-        weights[nearer, k], weights[nearer, (k + 1) % 3] = 1 - along[nearer], along[nearer]
-    return weights
 
 
 def _on_side_of_anchor(

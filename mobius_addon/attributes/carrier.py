@@ -8,10 +8,17 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_array
 
-from ...solver import Correspondence, interpolate, interpolate_corners
+from ...solver import Correspondence
 from ...solver.fill import HarmonicFill, nearest_known, with_nearest
-from ...solver.interpolate import local_similarities, source_of_corners, source_of_edges, source_of_faces
+from ...solver.interpolate import (
+    CornerInterpolation,
+    local_similarities,
+    source_of_corners,
+    source_of_edges,
+    source_of_faces,
+)
 from ...solver.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
 
@@ -47,22 +54,15 @@ class Carrier:
         (n_target,) bool
             Where there is a value: the other vertices have no counterpart.
         """
-        return self._filled(interpolate(self.correspondence, values))
+        return self._filled(self._matrix @ values.astype(np.float64))
 
     def corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
-        on_triangles = values[self.source.triangle_corners.ravel()]
-        carried = interpolate_corners(
-            self.correspondence,
-            self.source.mesh.vertices,
-            on_triangles,
-            self.target.mesh.faces,
-            self._polygon_of_triangle,
-        )
-        carried = carried.reshape(len(carried), *values.shape[1:])
-        corners, vertex = self.target.triangle_corners.ravel(), self.target.corner_vertex
-        result = np.zeros((len(vertex), *carried.shape[1:]))
-        result[corners] = carried
+        at_vertex, rows, beside_seams = self._corner_interpolation(values[self.source.triangle_corners.ravel()])
+        vertex = self.target.corner_vertex
+        result = at_vertex[vertex]
+        result[self.target.triangle_corners.ravel()[rows]] = beside_seams
+        result = result.reshape(len(vertex), *values.shape[1:])
         whole = self._whole_corners
         if self.gap == "leave" or whole.all():
             return result, whole
@@ -70,7 +70,7 @@ class Carrier:
             return result[self._nearest_corner], self._nearest_corner >= 0
         # around the gap each vertex gives the value of one of its corners beside it, never a mean across a seam
         known = self.correspondence.face[vertex] >= 0
-        at_vertex = np.zeros((len(self.correspondence.face), *carried.shape[1:]))
+        at_vertex = np.zeros((len(self.correspondence.face), *values.shape[1:]))
         at_vertex[vertex[known]] = result[known]
         beside = known & ~whole
         at_vertex[vertex[beside]] = result[beside]
@@ -127,7 +127,7 @@ class Carrier:
     def displacements(self, values: Values) -> tuple[Values, Booleans]:
         """Carry vectors per vertex, (n_source, 3), turned and scaled with the surface; returns as `points`."""
         rotation, scale = self._similarities
-        carried = interpolate(self.correspondence, values)
+        carried = self._matrix @ values
         return self._filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
 
     def normals(self, values: Values) -> tuple[Values, Booleans]:
@@ -168,6 +168,16 @@ class Carrier:
         if self.gap == "leave" or known.all():
             return known
         return self._nearest >= 0 if self.gap == "nearest" else self._fill.reached
+
+    @cached_property
+    def _matrix(self) -> csr_array:
+        return self.correspondence.matrix()
+
+    @cached_property
+    def _corner_interpolation(self) -> CornerInterpolation:
+        return CornerInterpolation(
+            self.correspondence, self.source.mesh.vertices, self.target.mesh.faces, self._polygon_of_triangle
+        )
 
     @cached_property
     def _fill(self) -> HarmonicFill:
