@@ -27,7 +27,7 @@ from .laplacian import laplacian
 from .locate import TriangulatedDisc
 from .mesh import Booleans, Complexes, Floats, Integers, TriangleMesh
 from .mobius import Mobius
-from .sampling import spread
+from .sampling import thinned
 from .surface_points import SurfacePoints
 
 NODES = 1500
@@ -294,7 +294,9 @@ def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integ
     inner = np.flatnonzero(inside)
     # as dense along the boundary as inside, for a round surface
     rim = flattening.boundary[:: max(1, round(len(flattening.boundary) / (3.5 * np.sqrt(count))))]
-    nodes = np.concatenate([inner[spread(flattening.mesh.vertices[inner], count)], rim])
+    nodes = np.concatenate(
+        [inner[thinned(flattening.mesh.vertices[inner], np.sqrt(0.53 * flattening.mesh.area / count))], rim]
+    )
     faces = Delaunay(np.stack([disc[nodes].real, disc[nodes].imag], axis=1)).simplices.astype(np.intp)
     turned = signed_areas(disc[nodes], faces)
     faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]

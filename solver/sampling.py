@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from .mesh import Booleans, Floats, Integers, TriangleMesh
 
@@ -73,3 +74,41 @@ def spread(points: Floats, count: int) -> Integers:
         chosen.append(int(np.argmax(square)))
         np.minimum(square, ((points - points[chosen[-1]]) ** 2).sum(axis=1), out=square)
     return np.array(chosen, dtype=np.intp)
+
+
+def thinned(points: Floats, spacing: float) -> Integers:
+    """Return points, as sorted indices, no two of which are nearer than `spacing`; all others are within twice that.
+
+    A Poisson-disc subset of points, (n, 3), in time nearly linear in n: thinned to a fraction of the spacing first,
+    then to double that, and so on. It depends on distances from the points' middle, not on their pose or order. Of a
+    dense area A about 0.53 A / spacing^2 points are left.
+    """
+    far = np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1)) / spacing
+    # as good as random between neighbours; what lies first in this order stays
+    rank = np.argsort(np.argsort(far * 1e5 % 1, kind="stable"))
+    kept = np.arange(len(points))
+    crowded = max(0, int(np.log2(max(len(points), 1)) / 2) - 4)
+    for halvings in range(crowded, -1, -1):
+        pairs = KDTree(points[kept]).query_pairs(spacing / 2**halvings, output_type="ndarray")
+        kept = kept[_independent(pairs, rank[kept])]
+    return kept
+
+
+def _independent(pairs: Integers, rank: Integers) -> Booleans:
+    """Return a maximal set, (n,), that holds one of each pair, (p, 2), at most: what comes first by rank, (n,), stays.
+
+    Luby, "A Simple Parallel Algorithm for the Maximal Independent Set Problem" (1986).
+    """
+    chosen = np.zeros(len(rank), bool)
+    undecided = np.ones(len(rank), bool)
+    while len(pairs):
+        first = rank[pairs[:, 0]] < rank[pairs[:, 1]]
+        later = np.where(first, pairs[:, 1], pairs[:, 0])
+        now = undecided.copy()
+        now[later] = False
+        chosen |= now
+        undecided &= ~now
+        undecided[pairs[now[pairs[:, 0]], 1]] = False
+        undecided[pairs[now[pairs[:, 1]], 0]] = False
+        pairs = pairs[undecided[pairs].all(axis=1)]
+    return chosen | undecided

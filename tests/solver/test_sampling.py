@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
-from scans import bumps
+from scans import bumps, similarity
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from solver import TriangleMesh
-from solver.sampling import edge_graph, extrema, farthest_points
+from solver.sampling import edge_graph, extrema, farthest_points, thinned
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +57,22 @@ def test_no_more_than_there_are(mesh):
 def test_edge_graph_holds_lengths():
     triangle = TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
     assert edge_graph(triangle).toarray().tolist() == [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
+
+
+@pytest.mark.parametrize("spacing", [0.02, 0.1, 0.5, 5.0])
+def test_thinned_points_keep_apart_and_near_all_others(spacing):
+    points = np.concatenate([bumps(20000, seed=4).vertices, np.zeros((3, 3))])
+    kept = thinned(points, spacing)
+    assert (np.diff(kept) > 0).all()
+    tree = KDTree(points[kept])
+    assert len(tree.query_pairs(spacing)) == 0
+    assert tree.query(points)[0].max() < 2 * spacing
+
+
+def test_thinned_points_do_not_depend_on_pose_or_order():
+    points = bumps(3000, seed=2).vertices
+    rng = np.random.default_rng(1)
+    scale, turn, shift = similarity(rng)
+    order = rng.permutation(len(points))
+    kept = thinned((scale * points @ turn + shift)[order], scale * 0.1)
+    assert sorted(order[kept].tolist()) == thinned(points, 0.1).tolist()
