@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from .kernels import kernels_for
-from .kernels.nodes import BOUND, HALF, X, Y, whole_disc
+from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
 from .matching import Matching, matching
 from .mesh import Complexes, Floats, Integers
 from .mobius import Mobius
@@ -26,12 +26,18 @@ from .mobius import Mobius
 CELLS_AT_ONCE = 64
 """Open cells taken on in one round, the best bounds first."""
 
+CENTRES = 16
+"""Cells of a round at whose centres a better transformation is looked for: more find it hardly earlier."""
+
 SHARES = 8
 """Parts that a round is dealt out in, whatever the number of threads, so that it finds the same with any."""
 
 FRONTIER = 1 << 18
 """Open cells, 64 bytes each, beyond which the smallest are searched first: then the search is depth first, and adds
 few more."""
+
+NEAR = 1 / 16
+"""Turns that rotations near a good one spread over."""
 
 SMALLEST_CELL = 2.0**-38
 """Half side of a cell that is not split further; what its bound leaves open is reported as a gap."""
@@ -251,11 +257,12 @@ class _Search:
         """Look for a better transformation at the centres of the most promising cells, then around the best of them."""
         kernels = self.kernels[side]
         inside = left[np.hypot(left[:, X], left[:, Y]) <= self.z_max]
-        inside = inside[np.argsort(-inside[:, BOUND], kind="stable")[:CELLS_AT_ONCE]]
+        inside = inside[np.argsort(-inside[:, BOUND], kind="stable")[:CENTRES]]
         z = inside[:, X] + 1j * inside[:, Y]
         if len(z) == 0:
             return
-        values, rotations = kernels.rotations(z, self.value)
+        # at the centre of a cell the window's angles are the rotations themselves
+        values, rotations = kernels.rotations(z, self.value, inside[:, [FROM, WIDTH]])
         k = int(np.argmax(values))
         if values[k] <= self.value:
             return
@@ -266,7 +273,8 @@ class _Search:
         while step > 1e-4:
             around: Complexes = z + step * (1 - abs(z) ** 2) * ring
             around = around[np.abs(around) <= self.z_max]
-            values, rotations = kernels.rotations(around, value, theta)
+            near = np.tile([theta / (2 * np.pi) - 0.5 * NEAR, NEAR], (len(around), 1))
+            values, rotations = kernels.rotations(around, value, near)
             k = int(np.argmax(values)) if len(values) else -1
             if k >= 0 and values[k] > value:
                 z, value, theta = complex(around[k]), float(values[k]), float(rotations[k])

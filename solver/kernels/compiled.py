@@ -16,20 +16,20 @@ from ..matching import Matching
 from ..mesh import Complexes, Floats
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 5
+INTERFACE = 7
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
 """Pairs that one thread can hold for the cells it has open, 8 bytes each; cells beyond look at all pairs again."""
-
-NEAR = 1 / 16
-"""Turns that rotations near a given one spread over."""
 
 MOST_RINGS = 128
 """Of the grid of target points: no more than the coarsest raster has."""
 
 ANGLES, MOST_LEVELS, SHARPNESS = 512, 4, 0.15
 """Of the raster, as in kernels.c."""
+
+OWN_RASTER, MOST_OWN = 64 * 256, 1 << 27
+"""Bytes of the raster that each source point has where their pairs differ, and of all of them at most."""
 
 COARSE = 4.0
 """Half side of the smallest cells that the raster is used for, over the length of its finest stretch."""
@@ -47,6 +47,8 @@ class _Problem(ctypes.Structure):
         *((name, _POINTER) for name in ("mx", "my", "start", "stop", "pairs", "inner", "reach", "weight", "raster")),
         ("levels", _I64),
         ("planes", _I64),
+        ("own", _POINTER),
+        ("step", _I64),
         ("density", _F64),
         ("typical", _F64),
         ("coarse", _F64),
@@ -86,8 +88,10 @@ def opened(path: Path) -> ctypes.CDLL:
     loaded.mobius_raster_bytes.argtypes = [_I64]
     loaded.mobius_raster.restype = None
     loaded.mobius_raster.argtypes = [_POINTER]
+    loaded.mobius_own_raster.restype = None
+    loaded.mobius_own_raster.argtypes = [_POINTER]
     loaded.mobius_rotations.restype = None
-    loaded.mobius_rotations.argtypes = [*[_POINTER] * 3, _F64, _F64, *[_POINTER] * 2, _I64, _F64, _POINTER, _I64]
+    loaded.mobius_rotations.argtypes = [*[_POINTER] * 7, _I64, _F64, _POINTER, _I64]
     loaded.mobius_expand.restype = _I64
     loaded.mobius_expand.argtypes = [_POINTER, _POINTER, _I64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]
     return loaded
@@ -131,21 +135,28 @@ class CompiledKernels:
             "reach": reach,
             "weight": None if problem.unit == 1 else np.round(problem.weight[order] / problem.unit).astype(np.uint32),
         }
+        finest = 1
         typical = float(np.median(widest)) if len(widest) else 1.0
         levels = int(np.clip(np.ceil(np.log2(1 / (SHARPNESS * typical * ANGLES))) + 1, 1, MOST_LEVELS))
         if shared:
             arrays["raster"] = np.empty(loaded.mobius_raster_bytes(levels) // 8, np.uint64)
+            finest = ANGLES << levels - 1
             arrays |= _grid(b, turn, inner, outer, widest, rings)
+        elif self.points * OWN_RASTER <= MOST_OWN:
+            arrays["own"] = np.empty(self.points * OWN_RASTER, np.uint8)
+            finest = 256
         # kept, because the structure holds bare addresses
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
+        self.rasters = "shared" if shared else "own" if "own" in arrays else ""
         self._problem = _Problem(
             points=self.points,
             planes=max(3, self.points.bit_length()),
             levels=levels,
             typical=typical,
-            coarse=COARSE / (ANGLES << levels),
-            density=4.0 * len(widest),
+            step=max(-(-int(np.round(problem.weight.max(initial=0) / problem.unit)) // 255), 1),
+            coarse=COARSE / finest,
+            density=4.0 * len(problem.point) / self.points,
             rings=rings,
             z_max=z_max,
             smallest=smallest,
@@ -154,6 +165,8 @@ class CompiledKernels:
         self._local = threading.local()
         if shared:
             loaded.mobius_raster(ctypes.addressof(self._problem))
+        elif "own" in arrays:
+            loaded.mobius_own_raster(ctypes.addressof(self._problem))
 
     def _work(self) -> int:
         """Return the address of this thread's working memory."""
@@ -178,21 +191,23 @@ class CompiledKernels:
         nodes[:, BOUND] *= self.unit
         return nodes
 
-    def rotations(self, z: Complexes, value: float = -1.0, near: float | None = None) -> tuple[Floats, Floats]:
+    def rotations(self, z: Complexes, value: float = -1.0, windows: Floats | None = None) -> tuple[Floats, Floats]:
         """Return, for each z, (C,), what a good theta is worth at most, and that theta.
 
         Worth 0: not above `value`, or not above the z before it.
 
-        near: a theta in radians; then only rotations close to it are looked at.
+        windows: (C, 2), the first rotation to look at and how many from there on, in turns; default: all.
         """
+        windows = np.tile([0.0, 1.0], (len(z), 1)) if windows is None else windows
+        start, width = np.ascontiguousarray(windows[:, 0]), np.ascontiguousarray(windows[:, 1])
         x, y = np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
         turns, bounds = np.zeros(len(z)), np.zeros(len(z))
         self._library.mobius_rotations(
             ctypes.addressof(self._problem),
             x.ctypes.data,
             y.ctypes.data,
-            0.0 if near is None else near / (2 * np.pi) - 0.5 * NEAR,
-            1.0 if near is None else NEAR,
+            start.ctypes.data,
+            width.ctypes.data,
             turns.ctypes.data,
             bounds.ctypes.data,
             len(z),

@@ -24,7 +24,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 5
+#define INTERFACE 7
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -43,6 +43,10 @@
    whether a disc touches one of the rings ring .. ring + 2^p - 1 in one of the stretches t .. t + 2^q - 1. So what the
    stretches of a window can match is one row from some bit on, or the union of four. A row goes round the circle once, and
    on for as long as the longest window. */
+/* Where rows differ, each source point has its own: the largest weight of a disc that touches a ring and a stretch, as a
+   multiple of `step` rounded up, in one byte. */
+#define OWN_RINGS 64
+
 #define ANGLES 512     /* of the coarsest level */
 #define MOST_LEVELS 5
 #define LEAST_RINGS 128
@@ -71,8 +75,10 @@ typedef struct {
     const Pair *pairs;
     const double *inner, *reach; /* of the pairs, and the running maximum of outer along each row */
     const uint32_t *weight; /* NULL: all 1 */
-    uint64_t *raster;       /* NULL: rows differ, or weights do; then grid is NULL too */
+    uint64_t *raster;       /* NULL: rows differ, or weights do; then grid is NULL too, and there may be `own` */
     int64_t levels, planes; /* of the raster; of the counters */
+    uint8_t *own;           /* NULL: none; (N1, OWN_RINGS, HEAVY_BINS) */
+    int64_t step;           /* of its bytes, in weights */
     double density, typical, coarse; /* discs to see at once; half-width of a typical one in turns; smallest half side of cells to use the raster for */
     const int64_t *grid;    /* the one row sorted by ring and sector of b: where each sector begins */
     const int64_t *nearest_ring, *farthest_ring; /* rings of the grid that hold all discs reaching out of and into a ring */
@@ -655,6 +661,104 @@ static void sum_raster(const Problem *p, Work *w, const Query *q, int64_t n, dou
     weigh(count, window, q, from, 1.0 / angles, width < 1 ? 0 : angles, out);
 }
 
+/* What the weights of the stretches of a window come to. */
+static void weigh_heavy(const uint32_t *total, const uint64_t *window, const Query *q, double from, double stretch, int round,
+                        Outcome *out) {
+    uint32_t best = 0;
+    for (int k = 0; k < HEAVY_BINS; k++)
+        if (window[k >> 6] >> (k & 63) & 1 && total[k] > best) best = total[k];
+    out->bound = best;
+    if ((double)best <= q->value) return;
+    uint64_t live[HEAVY_BINS / 64] = {0};
+    double value = least_worth(q, best);
+    for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)total[k] > value) << (k & 63);
+    for (int k = 0; k < HEAVY_BINS / 64; k++) live[k] &= window[k];
+    cluster(live, HEAVY_BINS / 64, from, stretch, round, q->gap, out);
+    for (int c = 0; c < out->clusters; c++) {
+        out->cluster_bound[c] = 0;
+        for (int k = out->first[c]; k < out->stop[c]; k++) {
+            int at = k < 0 ? k + HEAVY_BINS : k;
+            if (live[at >> 6] >> (at & 63) & 1 && total[at] > out->cluster_bound[c]) out->cluster_bound[c] = total[at];
+        }
+    }
+}
+
+/* Draw each source point's own discs. */
+EXPORT void mobius_own_raster(const Problem *p) {
+    for (int64_t j = 0; j < p->points; j++) {
+        uint8_t *raster = p->own + j * OWN_RINGS * HEAVY_BINS;
+        for (int i = 0; i < OWN_RINGS * HEAVY_BINS; i++) raster[i] = 0;
+        for (int64_t k = p->start[j]; k < p->stop[j]; k++) {
+            const Pair *pair = p->pairs + k;
+            int64_t weight = p->weight ? p->weight[k] : 1;
+            uint8_t level = (uint8_t)((weight + p->step - 1) / p->step);
+            int first = (int)(most(pair->inner, 0) * OWN_RINGS), last = (int)(least(pair->outer, 1) * OWN_RINGS);
+            /* an end on the edge of two rings touches both */
+            if (first > 0 && first >= most(pair->inner, 0) * OWN_RINGS) first--;
+            if (first > OWN_RINGS - 1) first = OWN_RINGS - 1;
+            if (last > OWN_RINGS - 1) last = OWN_RINGS - 1;
+            for (int ring = first; ring <= last; ring++) {
+                uint8_t *row = raster + ring * HEAVY_BINS;
+                double near = ring * (1.0 / OWN_RINGS), far = (ring + 1) * (1.0 / OWN_RINGS);
+                double half_width = pair_half_width(pair, near, far, 0x1p-12) + SLACK, begin = pair->turn - half_width;
+                int low = (int)whole(begin * HEAVY_BINS), high = (int)whole((begin + 2 * half_width) * HEAVY_BINS);
+                if (high - low >= HEAVY_BINS) { low = 0; high = HEAVY_BINS - 1; }
+                for (int i = low; i <= high; i++) {
+                    uint8_t *at = row + (i & (HEAVY_BINS - 1));
+                    if (*at < level) *at = level;
+                }
+            }
+        }
+    }
+}
+
+/* Bound Q over a cell and a window by the source points' own rasters. */
+static void sum_own_raster(const Problem *p, Work *w, const Query *q, int64_t n, double from, double width, Outcome *out) {
+    uint32_t total[HEAVY_BINS] = {0};
+    uint16_t some[HEAVY_BINS] = {0};
+    for (int64_t j = 0; j < n; j++) {
+        int inside = (int)(w->near[j] * OWN_RINGS), outside = (int)(w->far[j] * OWN_RINGS);
+        if (inside > OWN_RINGS - 1) inside = OWN_RINGS - 1;
+        if (outside > OWN_RINGS - 1) outside = OWN_RINGS - 1;
+        const uint8_t *row = p->own + (j * OWN_RINGS + inside) * HEAVY_BINS;
+        uint8_t round[2][2 * HEAVY_BINS], *a = round[0], *b = round[1]; /* twice around the circle */
+        for (int i = 0; i < HEAVY_BINS; i++) a[i] = row[i];
+        for (int ring = inside + 1; ring <= outside; ring++) {
+            row += HEAVY_BINS;
+            for (int i = 0; i < HEAVY_BINS; i++) a[i] = a[i] > row[i] ? a[i] : row[i];
+        }
+        int first = 0, count = HEAVY_BINS;
+        if (w->delta[j] < 0.25) {
+            first = (int)whole((w->alpha[j] - w->delta[j]) * HEAVY_BINS);
+            count = (int)whole((w->alpha[j] + w->delta[j]) * HEAVY_BINS) + 2 - first;
+        }
+        if (count >= HEAVY_BINS) {
+            uint8_t best = 0;
+            for (int i = 0; i < HEAVY_BINS; i++) best = a[i] > best ? a[i] : best;
+            for (int i = 0; i < HEAVY_BINS; i++) some[i] += best;
+        } else {
+            for (int i = 0; i < HEAVY_BINS; i++) a[HEAVY_BINS + i] = a[i];
+            int reach = 1; /* a[t] holds the largest of `reach` stretches from t on */
+            for (; 2 * reach <= count; reach *= 2) {
+                for (int i = 0; i < HEAVY_BINS; i++) b[i] = a[i] > a[i + reach] ? a[i] : a[i + reach];
+                for (int i = 0; i < HEAVY_BINS; i++) b[HEAVY_BINS + i] = b[i];
+                uint8_t *other = a; a = b; b = other;
+            }
+            const uint8_t *low = a + (first & (HEAVY_BINS - 1)), *high = a + ((first + count - reach) & (HEAVY_BINS - 1));
+            for (int i = 0; i < HEAVY_BINS; i++) some[i] += low[i] > high[i] ? low[i] : high[i];
+        }
+        if (j % 256 == 255 || j == n - 1)
+            for (int i = 0; i < HEAVY_BINS; i++) { total[i] += some[i]; some[i] = 0; }
+    }
+    for (int i = 0; i < HEAVY_BINS; i++) total[i] *= (uint32_t)p->step;
+    uint64_t window[HEAVY_BINS / 64] = {0};
+    if (width < 1) {
+        int low = (int)whole(from * HEAVY_BINS), high = (int)whole((from + width) * HEAVY_BINS);
+        for (int i = low; i <= high; i++) window[i >> 6 & (HEAVY_BINS / 64 - 1)] |= (uint64_t)1 << (i & 63);
+    } else for (int k = 0; k < HEAVY_BINS / 64; k++) window[k] = ~(uint64_t)0;
+    weigh_heavy(total, window, q, 0, 1.0 / HEAVY_BINS, HEAVY_BINS, out);
+}
+
 static void sum_pairs(const Problem *p, Work *w, const Query *q, int64_t n, double from, double width, Outcome *out) {
     Laying l;
     l.p = p; l.q = q; l.out = out;
@@ -695,24 +799,10 @@ static void sum_pairs(const Problem *p, Work *w, const Query *q, int64_t n, doub
     if (q->children && out->entries > q->room) out->entries = -1; /* too many to keep */
 
     if (p->weight) {
-        uint32_t best = 0;
-        for (int k = 0; k < HEAVY_BINS; k++) {
-            l.total[k] += l.whole;
-            best = l.total[k] > best ? l.total[k] : best;
-        }
-        out->bound = best;
-        if ((double)best <= q->value) return;
-        uint64_t live[HEAVY_BINS / 64] = {0};
-        double value = least_worth(q, best);
-        for (int k = 0; k < HEAVY_BINS; k++) live[k >> 6] |= (uint64_t)((double)l.total[k] > value) << (k & 63);
-        cluster(live, HEAVY_BINS / 64, from, width / HEAVY_BINS, width < 1 ? 0 : HEAVY_BINS, q->gap, out);
-        for (int c = 0; c < out->clusters; c++) {
-            out->cluster_bound[c] = 0;
-            for (int k = out->first[c]; k < out->stop[c]; k++) {
-                uint32_t t = l.total[k < 0 ? k + HEAVY_BINS : k];
-                if (t > out->cluster_bound[c]) out->cluster_bound[c] = t;
-            }
-        }
+        uint64_t all[HEAVY_BINS / 64];
+        for (int k = 0; k < HEAVY_BINS; k++) l.total[k] += l.whole;
+        for (int k = 0; k < HEAVY_BINS / 64; k++) all[k] = ~(uint64_t)0;
+        weigh_heavy(l.total, all, q, from, width / HEAVY_BINS, width < 1 ? 0 : HEAVY_BINS, out);
         return;
     }
     if (waiting) {
@@ -755,7 +845,8 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
         if (width > FULL) { from = 0; width = 1; }
     }
     out->entries = 0; out->painted = 0; out->clusters = 0;
-    if (q->raster) sum_raster(p, w, q, n, from, width, out);
+    if (q->raster && p->raster) sum_raster(p, w, q, n, from, width, out);
+    else if (q->raster) sum_own_raster(p, w, q, n, from, width, out);
     else sum_pairs(p, w, q, n, from, width, out);
 }
 
@@ -811,48 +902,61 @@ EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, int32_t rast
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
         Outcome out;
-        Query query = {&nodes[i], 0x1p40, raster && p->raster, 0, 0, 0, 0, 1, 0};
+        Query query = {&nodes[i], 0x1p40, raster && (p->raster || p->own), 0, 0, 0, 0, 1, 0};
         evaluate(p, &w, &query, &out);
         nodes[i].bound = out.bound; nodes[i].kx = out.kx; nodes[i].ky = out.ky;
     }
 }
 
-/* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretches,
-   from a window on. Worth 0: not above `value`, or not above the z before it. */
-EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, double from, double width,
-                             double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
+typedef struct { Node node; int64_t offset, entries, free; } Open; /* list of pairs (entries < 0: none), arena in use */
+
+/* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretches
+   of its window. Worth 0: not above `value`, or not above the z before it. */
+EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, const double *from,
+                             const double *width, double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
-        Node open[LOOKS * CLUSTERS + 1];
-        int depth = 1, raster = p->raster != 0;
-        open[0] = (Node){x[i], y[i], 0, 0, 0, from, width, 0x1p40};
+        Open open[LOOKS * CLUSTERS + 1];
+        int64_t top = 0;
+        int depth = 1, raster = p->raster || p->own;
+        open[0] = (Open){{x[i], y[i], 0, 0, 0, from[i], width[i], 0x1p40}, 0, -1, 0};
         turns[i] = bounds[i] = 0;
         for (int looks = 0; depth && looks < LOOKS; looks++) {
-            Node node = open[--depth];
+            Open seen = open[--depth];
+            Node node = seen.node;
             if (node.bound <= value) continue;
             Outcome out;
-            Query query = {&node, value, raster, 0, 0, 0, 0, ALIKE, node.width > 0x1p-6 ? 0.85 : 1};
+            const Entry *list = seen.entries < 0 ? 0 : w.arena + seen.offset;
+            Entry *children = raster || list ? 0 : w.arena + top;
+            /* coarse stretches overstate: the best of them need not hold the best rotation, so all that are nearly as good are
+               kept until they no longer shrink */
+            int strict = !raster && (seen.free || node.width < 0x1p-6);
+            Query query = {&node, value, raster, list, seen.entries, children, w.room - top, ALIKE, strict ? 1 : 0.85};
             evaluate(p, &w, &query, &out);
+            if (children && out.entries > 0) { seen.offset = top; seen.entries = out.entries; top += out.entries; }
             int base = depth;
             for (int c = 0; c < out.clusters; c++) {
-                Node next = node;
-                next.from = out.cluster_from[c]; next.width = out.cluster_width[c]; next.bound = out.cluster_bound[c];
-                if (next.width > FULL) { next.from = node.from; next.width = node.width; }
+                Open next = seen;
+                next.node.from = out.cluster_from[c]; next.node.width = out.cluster_width[c];
+                next.node.bound = out.cluster_bound[c];
+                if (next.node.width > FULL) { next.node.from = node.from; next.node.width = node.width; }
                 int k = depth++;
-                while (k > base && open[k - 1].bound > next.bound) { open[k] = open[k - 1]; k--; }
+                while (k > base && open[k - 1].node.bound > next.node.bound) { open[k] = open[k - 1]; k--; }
                 open[k] = next;
             }
             if (raster || !out.clusters) { raster = 0; continue; }
-            Node best = open[depth - 1];
-            if (best.width > SHARP && best.width < 0.9 * node.width) continue;
+            Node best = open[depth - 1].node;
+            int shrinks = best.width > SHARP && best.width < 0.9 * node.width;
+            if (shrinks || !strict) {
+                if (!shrinks) for (int k = base; k < depth; k++) open[k].free = 1;
+                continue;
+            }
             depth = base;
             turns[i] = best.from + 0.5 * best.width;
             bounds[i] = value = best.bound;
         }
     }
 }
-
-typedef struct { Node node; int64_t offset, entries, free; } Open; /* list of pairs (entries < 0: none), arena in use */
 
 /* Search the subtrees of `nodes` depth first for cells whose bound exceeds `value`, at most `budget` bounds each; what is
    left open goes to `left`. Returns how many of `nodes` were taken on (all, unless `left` might overflow).
@@ -886,10 +990,10 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                 if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) continue;
                 if (child.width < 1) child.from -= (child.kx * sy + child.ky * sx) * PER_RADIAN;
                 const Entry *list = open.entries < 0 ? 0 : w.arena + open.offset;
-                int gap = (p->weight ? HEAVY_BINS : BINS) / 16, raster = p->raster && half >= p->coarse && !list;
+                int gap = (p->weight ? HEAVY_BINS : BINS) / 16, raster = (p->raster || p->own) && half >= p->coarse && !list;
                 Outcome coarse, out;
                 if (raster) {
-                    Query query = {&child, value, 1, 0, 0, 0, 0, RASTER_GAP, 0};
+                    Query query = {&child, value, 1, 0, 0, 0, 0, p->raster ? RASTER_GAP : gap, 0};
                     evaluate(p, &w, &query, &coarse);
                     bounds++; spent++;
                     child.kx = coarse.kx; child.ky = coarse.ky;

@@ -49,9 +49,9 @@ class ReferenceKernels:
     def __init__(self, problem: Matching, z_max: float, smallest: float) -> None:
         self.problem, self.z_max, self.smallest = problem, z_max, smallest
 
-    def rotations(self, z: Complexes, value: float = -1.0, near: float | None = None) -> tuple[Floats, Floats]:
+    def rotations(self, z: Complexes, value: float = -1.0, windows: Floats | None = None) -> tuple[Floats, Floats]:
         """Return U(z) and a theta that attains it for each z, (C,), over all rotations."""
-        del value, near
+        del value, windows
         return best_rotations(self.problem, z)
 
     def expand(self, nodes: Floats, value: float, budget: int) -> tuple[Floats, int]:

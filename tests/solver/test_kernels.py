@@ -99,15 +99,21 @@ def test_bound_of_a_cell_exceeds_the_value_at_every_point_of_it(seed):
     assert (best_rotations(problem, z[inside])[0] <= bounds[inside]).all()
 
 
-@settings(max_examples=40, deadline=None)
+@pytest.mark.parametrize("own", [False, True], ids=["one raster", "one for each source point"])
+@settings(max_examples=60, deadline=None)
 @given(SEEDS)
-def test_the_raster_rounds_outward(seed):
+def test_the_raster_rounds_outward(own, seed):
     rng = np.random.default_rng(seed)
-    n1, n2 = rng.integers(1, 30, 2)
+    n1, n2 = rng.integers(1 + own, 30, 2)
     metric = str(rng.choice(["hyperbolic", "euclidean"]))
     radius = 10.0 ** rng.uniform(-3, -0.3, n2)
-    problem = matching(nasty_points(rng, n1), disc_points(rng, n2, 0.999), radius, metric=metric)
+    weights = np.round(rng.random((n1, n2)), rng.integers(0, 9)) if own else None
+    if weights is not None:
+        weights[0, 0] = 0
+    source, target = nasty_points(rng, n1), disc_points(rng, n2, 0.999)
+    problem = matching(source, target, radius, metric=metric, weights=weights)
     kernels = CompiledKernels(problem, 0.9, SMALLEST_CELL)
+    assert kernels.rasters == ("own" if own else "shared")
     centre, half = random_cells(rng, problem, 60)
     nodes = cells_as_nodes(centre, half)
     found = kernels.bounds(nodes, raster=True)
@@ -118,9 +124,10 @@ def test_the_raster_rounds_outward(seed):
     assert (best_rotations(problem, z[inside])[0] <= coarse[inside]).all()
 
 
+@pytest.mark.parametrize("raster", [False, True])
 @settings(max_examples=80, deadline=None)
 @given(SEEDS)
-def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(seed):
+def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(raster, seed):
     rng = np.random.default_rng(seed)
     problem = random_problem(rng)
     centre, half = random_cells(rng, problem, 60)
@@ -129,7 +136,7 @@ def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(seed):
     nodes[:, FROM] = rng.uniform(-2, 2, 60)
     kappa = 2 * disc_points(rng, 60)
     nodes[:, KAPPA_X], nodes[:, KAPPA_Y] = kappa.real, kappa.imag
-    bounds = CompiledKernels(problem, 0.9, SMALLEST_CELL).bounds(nodes)[:, BOUND]
+    bounds = CompiledKernels(problem, 0.9, SMALLEST_CELL).bounds(nodes, raster)[:, BOUND]
     z, inside = points_of_cells(rng, centre, half)
     for k in np.flatnonzero(inside):
         # rotations of the window, often those of its ends, carried back from phi to theta
