@@ -283,7 +283,7 @@ GERMAN = {
     "{:,} will be filled": "{:,} werden gefüllt",
     "{:.1%} ahead": "{:.1%} voraus",
     "{:.1%} behind": "{:.1%} dahinter",
-    "{:.1f} matched of at most {:.1f}": "{:.1f} erreicht von höchstens {:.1f}",
+    "{:.1f} of at most {:.1f}, gap {:.1f}": "{:.1f} von höchstens {:.1f}, Lücke {:.1f}",
     "{:.1f} s": "{:.1f} s",
     "{} is under way: press ESC to stop it": "{} läuft: ESC bricht ab",
     "{} stopped: nothing was changed": "{} abgebrochen: Nichts wurde geändert",

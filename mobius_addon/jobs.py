@@ -84,7 +84,8 @@ def describe_proof(progress: Progress) -> str:
     """Return what the search has proved so far, or nothing outside the search."""
     if progress.value is None or progress.upper_bound is None:
         return ""
-    return iface_("{:.1f} matched of at most {:.1f}").format(progress.value, progress.upper_bound)
+    gap = progress.upper_bound - progress.value
+    return iface_("{:.1f} of at most {:.1f}, gap {:.1f}").format(progress.value, progress.upper_bound, gap)
 
 
 def why_busy() -> str | None:

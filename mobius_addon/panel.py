@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import stored_alignment, topology_cache
+from . import overlay, stored_alignment, topology_cache
 from .attributes import KINDS
 from .heat_maps import MAP_MEASURES
 from .jobs import Job, MOBIUS_OT_stop, describe_proof
@@ -33,7 +33,7 @@ from .options import (
 )
 from .preferences import preferences
 from .preset_menus import MOBIUS_PT_align_presets, MOBIUS_PT_transfer_presets
-from .usable import why_not, why_not_aligned
+from .usable import why_not
 
 
 class MobiusPanel:
@@ -82,7 +82,7 @@ class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show where there is one."""
-        return why_not_aligned(context.scene.mobius, context.scene, writes=False) is None
+        return overlay.pair(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the figures."""

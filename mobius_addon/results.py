@@ -94,8 +94,9 @@ def pattern_color(disc: Complexes, checks: int = 12) -> Floats:
     """
     across, up = (np.sin(np.pi * checks / 2 * x) for x in (disc.real, disc.imag))
     light = np.clip(0.5 + 2 * across * up, 0, 1)
-    color = disc_color(disc)
-    color[:, :3] *= (0.25 + 0.75 * light)[:, None]
+    # nearer to the rim, where hues are fuller
+    color = disc_color(disc / np.sqrt(np.maximum(np.abs(disc), 1e-12)))
+    color[:, :3] *= (0.3 + 0.7 * light)[:, None]
     return color
 
 

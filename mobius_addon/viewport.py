@@ -48,13 +48,38 @@ def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:
     return np.array(space.region_3d.view_rotation.to_matrix()).T
 
 
-def look_at_selected_alone(context: bpy.types.Context) -> None:
-    """Show the selected objects alone, filling the viewport; nothing is done without a window."""
+def look_at_selected_alone(context: bpy.types.Context, places: Floats) -> None:
+    """Show the selected objects alone, with points of the world, (k, 3), filling the part of the viewport that is free.
+
+    Nothing is done without a window.
+    """
     space = space_of(context)
     if space is not None:
         if space.local_view:
             _toggle_local_view(context)
         _toggle_local_view(context)
+        with _in_viewport(context):
+            _fill(bpy.context, places)
+
+
+def _fill(context: bpy.types.Context, places: Floats) -> None:
+    """Move the view so that points fill what toolbar and sidebar leave of it."""
+    region, view = context.region, context.space_data.region_3d
+    over = {"LEFT": 0, "RIGHT": 0}
+    if context.preferences.system.use_region_overlap:
+        for other in context.area.regions:
+            if other.type in ("TOOLS", "UI") and other.alignment in over:
+                over[other.alignment] += other.width
+    axes = axes_of(context.space_data)
+    low, high = (places @ axes.T).min(axis=0), (places @ axes.T).max(axis=0)
+    # what is seen at the distance of the middle: 72 mm, Blender's film, by the lens; it fits the longer side
+    free = max(region.width - over["LEFT"] - over["RIGHT"], region.width / 4)
+    longer = max(region.width, region.height)
+    size = 1.15 * max((high[0] - low[0]) / free, (high[1] - low[1]) / region.height) * longer
+    middle = (low + high) / 2
+    middle[0] += size / longer * (over["RIGHT"] - over["LEFT"]) / 2
+    view.view_location = middle @ axes
+    view.view_distance = size * context.space_data.lens / 72 + (high[2] - low[2]) / 2
 
 
 def look_at_all_again(context: bpy.types.Context) -> None:
@@ -76,7 +101,7 @@ def edit(context: bpy.types.Context, obj: bpy.types.Object) -> None:
 
 def _toggle_local_view(context: bpy.types.Context) -> None:
     with _in_viewport(context):
-        bpy.ops.view3d.localview(frame_selected=True)
+        bpy.ops.view3d.localview(frame_selected=False)
 
 
 def _in_viewport(context: bpy.types.Context) -> Any:

@@ -70,7 +70,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
             obj.select_set(obj in copies)
         context.view_layer.objects.active = copies[1]
         viewport.show_colors(context)
-        viewport.look_at_selected_alone(context)
+        viewport.look_at_selected_alone(context, np.concatenate([places[0], posed + right * step]))
         return {"FINISHED"}
 
 

@@ -88,7 +88,7 @@ def test_the_window_goes_on_while_the_work_does() -> None:
     assert operator.execute(window) == {"RUNNING_MODAL"}
     assert operator.heard.wait(5)
     assert operator.modal(window, event("TIMER")) == {"RUNNING_MODAL", "PASS_THROUGH"}
-    assert window.status[-1] == "Test: Searching: 3.0 matched of at most 4.0   |   ESC: Stop"
+    assert window.status[-1] == "Test: Searching: 3.0 of at most 4.0, gap 1.0   |   ESC: Stop"
     for kind in ("MOUSEMOVE", "MIDDLEMOUSE", "A"):
         assert operator.modal(window, event(kind)) == {"RUNNING_MODAL", "PASS_THROUGH"}
     assert jobs.why_busy() == "Test is under way: press ESC to stop it"

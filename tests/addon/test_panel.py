@@ -176,7 +176,7 @@ def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], mon
     monkeypatch.setattr(jobs.Job, "current", under_way)
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" not in said
-    assert {"Searching", "30.0 matched of at most 40.0", "Stop"} <= set(said)
+    assert {"Searching", "30.0 of at most 40.0, gap 10.0", "Stop"} <= set(said)
     for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer):
         assert not operator.poll()
     with pytest.raises(RuntimeError, match="Align is under way: press ESC to stop it"):

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from surfaces import planar, rings, spherical_cap
 
 from solver import Mobius, TriangleMesh, flatten, topology
-from solver.distortion import angle_errors, dilatations, distortion, vertex_angle_errors
+from solver.distortion import angle_errors, dilatations, distortion, log_conformal_factor, vertex_angle_errors
 
 
 def measured(mesh: TriangleMesh, plane: np.ndarray):
@@ -26,6 +27,17 @@ def test_an_affine_map_has_its_ratio_of_stretches_as_dilatation(stretch):
     points = rings(9, jitter=0.3)
     plane = np.exp(0.4j) * (points * np.exp(1j)).real * stretch + 1j * np.exp(0.4j) * (points * np.exp(1j)).imag
     assert dilatations(planar(points), plane) == pytest.approx(np.full(len(planar(points).faces), stretch))
+
+
+def test_a_map_into_space_is_measured_like_one_into_the_plane():
+    points = rings(9, jitter=0.3)
+    mesh, plane = planar(points), 2 * points.real + 1j * points.imag
+    turn = Rotation.from_rotvec((0.4, -1.0, 2.0)).as_matrix()
+    space = np.stack([plane.real, plane.imag, np.zeros(len(plane))], axis=1) @ turn.T + (1, 2, 3)
+    assert dilatations(mesh, space) == pytest.approx(dilatations(mesh, plane))
+    assert log_conformal_factor(mesh, space) == pytest.approx(log_conformal_factor(mesh, plane))
+    # in space a triangle that is turned over is like any other
+    assert dilatations(mesh, space * (-1, 1, 1)) == pytest.approx(2)
 
 
 def test_angles_of_one_triangle():

@@ -1,0 +1,223 @@
+"""Runs in Blender's window, driven by `gui_shot.sh`: what a person does with the installed extension, by real clicks.
+
+Two scans are chosen in the pickers, aligned, stopped with ESC, aligned again, looked at, transferred and undone, and
+every step is checked. Where a button is, the script finds out as a person could: it moves the mouse down the sidebar
+and presses Ctrl C, with which Blender copies the command of the button under the mouse.
+
+`bpy`, `PACKAGE`, `region`, `click` and `shot` are the driver's.
+"""
+
+import importlib
+import json
+import os
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mathutils import Euler, Vector
+
+SHOTS = Path(os.environ["MOBIUS_SHOTS"])
+STEP = 9
+"""Pixels between places where a button is looked for; a row is twenty high."""
+
+demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
+Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+
+Wait = Iterator[float]
+
+
+def steps() -> Wait:
+    """Everything, with the seconds to wait in between."""
+    source, target = set_the_scene()
+    yield 1.0
+    before = state(source), state(target)
+
+    yield from choose("source", source)
+    yield from choose("target", target)
+    settings = bpy.context.scene.mobius
+    assert (settings.source, settings.target) == (source, target), "the pickers were not used"
+    yield from picture("chosen")
+
+    align = yield from find("bpy.ops.mobius.align")
+    for stage in ("Measuring curvature", "Searching", "Bending"):
+        yield from click_on(align)
+        yield from until(lambda stage=stage: stage_now() == stage)
+        assert (state(source), state(target)) == before
+        if stage == "Searching":
+            yield from until(lambda: Job.current is None or Job.current.progress.value)
+            yield from picture("searching")
+        start = time.perf_counter()
+        escape()
+        yield from until(lambda: Job.current is None, every=0.02)
+        print(f"[clicks] ESC while '{stage}': over after {time.perf_counter() - start:.2f} s", flush=True)
+        assert (state(source), state(target)) == before, "a stopped alignment has changed something"
+        yield 0.3
+
+    yield from click_on(align)
+    yield from until(lambda: Job.current is not None)
+    yield from until(lambda: Job.current is None)
+    yield 0.5
+    found = json.loads(target.data.mobius_alignment.report)
+    assert found["certified"], found
+    assert "Mobius" in source.data.uv_layers
+    assert "Mobius" in target.data.uv_layers
+    aligned = state(source), state(target)
+    yield from picture("aligned")
+
+    transfer = yield from find("bpy.ops.mobius.transfer")
+    yield from click_on(transfer)
+    yield from until(lambda: Job.current is None and state(target) != aligned[1])
+    assert {group.name for group in source.vertex_groups} <= {group.name for group in target.vertex_groups}
+    assert target.data.shape_keys.key_blocks.keys() == source.data.shape_keys.key_blocks.keys()
+    yield from picture("transferred")
+    for expected in (aligned, before):
+        undo()
+        yield 1.0
+        source, target = bpy.data.objects[source.name], bpy.data.objects[target.name]
+        assert (state(source), state(target)) == expected, "one undo takes back one step"
+    redo()
+    yield 0.5
+    redo()
+    yield 1.0
+
+    view = bpy.context.window_manager.mobius_view
+    view.matches = True
+    yield from picture("matches")
+    view.matches = False
+    for measure in ("confidence", "dilatation", "factor"):
+        bpy.ops.mobius.heat_map("EXEC_DEFAULT", True, measure=measure)
+        yield from picture(f"heat-map-{measure}")
+    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield from picture("side-by-side")
+    assert bpy.context.space_data.local_view is not None
+    bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    assert bpy.context.space_data.local_view is None
+    bpy.ops.mobius.show_discs()
+    yield from picture("discs")
+    bpy.context.preferences.view.language = "de_DE"
+    yield from picture("german")
+    bpy.context.preferences.view.language = "en_US"
+    yield 0.5
+
+    # another file in the middle of the work
+    bpy.ops.mobius.align("INVOKE_DEFAULT")
+    yield from until(lambda: stage_now() == "Searching")
+    bpy.ops.wm.read_homefile(use_factory_startup=False)
+    yield 1.0
+    assert Job.current is None, "the work goes on after its file was closed"
+    assert not bpy.context.window_manager.mobius_view.discs
+    print("[clicks] done", flush=True)
+
+
+def set_the_scene() -> tuple[Any, Any]:
+    """Put the demo's two scans beside each other and look at their faces."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    source, target, _ = demo.build_objects(bpy.context.scene)
+    for obj in (source, target):
+        obj.name = obj.name.title()
+    right = Vector((1, 0.15, 0))
+    target.scale = (0.55,) * 3
+    target.location = right * 2.6 - 0.55 * Vector(sum(map(Vector, target.bound_box), Vector()) / 8)
+    bpy.context.view_layer.update()
+    bpy.context.space_data.region_3d.view_rotation = Euler((1.3, 0, 0.15)).to_quaternion()
+    bpy.ops.view3d.view_all()
+    bpy.ops.ed.undo_push(message="scene")
+    return source, target
+
+
+def state(obj: Any) -> dict[str, Any]:
+    """What an operator could have changed."""
+    mesh = obj.data
+    return {
+        "attributes": sorted((x.name, x.data_type, x.domain) for x in mesh.attributes if not x.name.startswith(".")),
+        "groups": [group.name for group in obj.vertex_groups],
+        "keys": [] if mesh.shape_keys is None else mesh.shape_keys.key_blocks.keys(),
+        "aligned": mesh.mobius_alignment.target_fingerprint,
+        "materials": len(mesh.materials),
+    }
+
+
+def stage_now() -> str | None:
+    return None if Job.current is None else Job.current.progress.stage
+
+
+def until(happened: Any, every: float = 0.1) -> Wait:
+    """Wait for something, a minute at most."""
+    end = time.monotonic() + 60
+    while not happened():
+        assert time.monotonic() < end, "nothing happened in a minute"
+        yield every
+
+
+def picture(name: str) -> Wait:
+    yield 1.2
+    shot(str(SHOTS / f"{name}.png"))
+
+
+# hand and eye
+
+
+def pointer(*arguments: object) -> None:
+    subprocess.run(["xdotool", *map(str, arguments)], check=True)
+
+
+def escape() -> None:
+    pointer("key", "Escape")
+
+
+def undo() -> None:
+    over_the_viewport()
+    pointer("key", "ctrl+z")
+
+
+def redo() -> None:
+    over_the_viewport()
+    pointer("key", "ctrl+shift+z")
+
+
+def over_the_viewport() -> None:
+    part = region("WINDOW")
+    pointer("mousemove", part.x + part.width // 3, screen_height() - part.y - 40)
+
+
+def screen_height() -> int:
+    return bpy.context.window.height
+
+
+def click_on(place: tuple[int, int]) -> Wait:
+    click(*place)
+    yield 0.3
+    over_the_viewport()
+
+
+def find(command: str, keys: str = "ctrl+c") -> Any:
+    """Return where the sidebar's button of a command is: move the mouse down and ask at each place."""
+    sidebar = region("UI")
+    x = sidebar.x + (sidebar.width - 24) // 2
+    top = screen_height() - (sidebar.y + sidebar.height)
+    for y in range(top + 30, top + sidebar.height - 5, STEP):
+        bpy.context.window_manager.clipboard = ""
+        pointer("mousemove", x - 2, y, "mousemove", x, y)
+        yield 0.12
+        pointer("key", keys)
+        yield 0.08
+        if bpy.context.window_manager.clipboard.startswith(command):
+            print(f"[clicks] {command} is at {x}, {y}", flush=True)
+            return x, y
+    raise AssertionError(f"the sidebar shows nothing of {command}")
+
+
+def choose(role: str, obj: Any) -> Wait:
+    """Choose an object in a picker: click on it, type the name, confirm."""
+    place = yield from find(f'bpy.data.scenes["Scene"].mobius.{role}', "ctrl+alt+shift+c")
+    click(*place)
+    yield 0.8
+    pointer("type", "--delay", "40", obj.name)
+    yield 0.8
+    pointer("key", "Return")
+    yield 0.8
+    over_the_viewport()

@@ -1,0 +1,59 @@
+"""The installed extension in a real Blender with its window, used by real clicks.
+
+Needs the script that sets up a Blender of its own and drives its window: `MOBIUS_GUI` names it, or it is
+`../shared/tools/gui_shot.sh`. `MOBIUS_SHOTS` names a folder that keeps the pictures.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solver.kernels.build_wheel import this_platform
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+GUI = Path(os.environ.get("MOBIUS_GUI", ROOT.parent / "shared/tools/gui_shot.sh"))
+ROOTS = Path(os.environ.get("BLENDER_ROOTS", "/opt"))
+
+PICTURES = (
+    *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
+    *("heat-map-factor", "side-by-side", "discs", "german"),
+)
+
+
+@pytest.fixture(scope="session")
+def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The zip for this platform, as people install it."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, str(ROOT), "build", this_platform(), "-o", str(folder)]
+    subprocess.run(command, check=True, timeout=550)
+    (path,) = folder.iterdir()
+    return path
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("suite", ["sid", "trixie"])
+def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    if os.environ.get("MOBIUS_WINDOW") != "1":
+        pytest.skip("takes minutes of a machine's time: MOBIUS_WINDOW=1 asks for it")
+    if not GUI.is_file():
+        pytest.skip(f"'{GUI}' is not there (MOBIUS_GUI names the script that drives Blender's window)")
+    if not (ROOTS / suite / "usr/bin/blender").exists():
+        pytest.skip(f"no Blender is set up in '{ROOTS / suite}'")
+    extension = request.getfixturevalue("extension")
+    shots = Path(os.environ.get("MOBIUS_SHOTS", tmp_path)) / suite
+    shots.mkdir(parents=True, exist_ok=True)
+    settings = {"SUITE": suite, "GUI_TAB": "Möbius", "GUI_SIZE": "1600x1300", "MOBIUS_SHOTS": str(shots)}
+    done = subprocess.run(
+        [GUI, extension, HERE / "clicks.py", shots / "end.png"],
+        env=os.environ | settings, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    sys.stdout.write("".join(f"{line}\n" for line in done.stdout.splitlines() if line.startswith("[clicks]")))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "[clicks] done" in done.stdout
+    assert "Traceback" not in done.stdout, done.stdout
+    for name in PICTURES:
+        assert (shots / f"{name}.png").is_file(), name
