@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
 
 from ..solver import Correspondence, Flattening, TriangleMesh
 from ..solver.distortion import dilatations, log_conformal_factor
@@ -43,6 +44,8 @@ class Measure:
         or for maps between surfaces a `Correspondence` and the meshes of source and target.
     stops : (k, 3) float64
         The scale's sRGB colors, evenly spaced.
+    title : str
+        What stands above the legend.
     ticks : tuple of str
         What the scale's values mean, evenly spaced from its begin to its end.
     """
@@ -53,6 +56,7 @@ class Measure:
     attribute: str
     shares: Callable[..., Floats]
     stops: Floats
+    title: str
     ticks: tuple[str, ...]
 
     def color(self, *of: Flattening | Correspondence | TriangleMesh) -> tuple[Floats, Booleans]:
@@ -125,6 +129,7 @@ DISC_MEASURES = (
         "Mobius Disc Angles",
         _dilatation_of_disc,
         SEQUENTIAL,
+        n_("Angles: ratio of stretches"),
         _ANGLE_TICKS,
     ),
     Measure(
@@ -135,6 +140,7 @@ DISC_MEASURES = (
         "Mobius Disc Sizes",
         _factor_of_disc,
         DIVERGING,
+        n_("Sizes: factor of lengths"),
         _SIZE_TICKS,
     ),
 )
@@ -149,6 +155,7 @@ MAP_MEASURES = (
         "Mobius Confidence",
         _confidence,
         SEQUENTIAL,
+        "Confidence",
         ("0", "0.5", "1"),
     ),
     Measure(
@@ -159,6 +166,7 @@ MAP_MEASURES = (
         "Mobius Map Angles",
         _dilatation_of_map,
         SEQUENTIAL,
+        n_("Angles: ratio of stretches"),
         _ANGLE_TICKS,
     ),
     Measure(
@@ -169,6 +177,7 @@ MAP_MEASURES = (
         "Mobius Map Sizes",
         _factor_of_map,
         DIVERGING,
+        n_("Sizes: factor of lengths"),
         _SIZE_TICKS,
     ),
 )

@@ -261,7 +261,7 @@ def _draw_legend(shown: Measure, left: float, bottom: float, scale: float) -> No
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     color = _opaque(np.repeat(shown.stops, 2, axis=0), 1.0)
     batch_for_shader(shader, "TRI_STRIP", {"pos": _floats(corners), "color": _floats(color)}).draw(shader)
-    _write(iface_(shown.label), left, bottom + line + height + 5 * scale)
+    _write(iface_(shown.title), left, bottom + line + height + 5 * scale)
     for share, tick in zip(np.linspace(0, 1, len(shown.ticks)), shown.ticks, strict=True):
         _write(tick, left + share * width, bottom, at=share)
 
@@ -286,7 +286,7 @@ def _free_corner(context: bpy.types.Context) -> tuple[float, float]:
     for region in context.area.regions:
         if over and region.type == "TOOLS" and region.alignment == "LEFT":
             left += region.width
-        elif over and region.type.startswith("ASSET_SHELF") and region.height > 1:
+        elif over and region.type.startswith(("ASSET_SHELF", "HUD")) and region.height > 1:
             bottom += region.height
     return left, bottom
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..solver.mesh import Booleans, Complexes, Floats
 from .attributes import MAX_UV_MAPS, SHARED_LAYOUT, AttributeAccess, VertexGroupAccess
@@ -14,6 +15,9 @@ from .mesh_data import Refusal, Surface, foreach
 
 _LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
 _COLOR = AttributeAccess("FLOAT_COLOR", "POINT", "color", 4)
+
+CHECKS = 12
+"""Of the pattern, along the diagonal of the source."""
 
 NO_COUNTERPART = (0.05, 0.05, 0.05, 1.0)
 """Linear color of points that correspond to nothing."""
@@ -87,16 +91,24 @@ def read_layout(obj: bpy.types.Object) -> Layout | None:
     return Layout(disc, edges[np.isfinite(disc)[edges].all(axis=1)])
 
 
-def pattern_color(disc: Complexes, checks: int = 12) -> Floats:
-    """Return linear colors, (n, 4), of a chequered pattern on the unit disc at points, (n,), `checks` across.
+def pattern_color(disc: Complexes, places: Floats) -> Floats:
+    """Return linear colors, (n, 4), of a pattern of checks in all directions of space.
 
-    The hues are those of `disc_color`, so that no two checks look alike; edges are soft, as colors at vertices are.
+    The edges of the checks are soft, as colors at vertices are, and hues tell them apart.
+
+    Parameters
+    ----------
+    disc : (n,) complex128
+        Points of the unit disc, for the hues.
+    places : (n, 3) float64
+        Points in space, for the checks: `CHECKS` to the unit.
     """
-    across, up = (np.sin(np.pi * checks / 2 * x) for x in (disc.real, disc.imag))
-    light = np.clip(0.5 + 2 * across * up, 0, 1)
+    # along axes askew to those of the object, which flat parts of it may lie across
+    waves = np.sin(np.pi * CHECKS * places @ Rotation.from_euler("xyz", (0.5, 0.7, 0.3)).as_matrix())
+    light = 0.5 + 0.5 * np.prod(np.tanh(4 * waves), axis=1)
     # nearer to the rim, where hues are fuller
     color = disc_color(disc / np.sqrt(np.maximum(np.abs(disc), 1e-12)))
-    color[:, :3] *= (0.3 + 0.7 * light)[:, None]
+    color[:, :3] *= (0.25 + 0.75 * light)[:, None]
     return color
 
 

@@ -51,9 +51,10 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
         except (Refusal, MeshError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for obj, layout in ((source, layouts[0]), (target, layouts[1])):
+        on_source = surfaces[0].mesh.vertices / np.linalg.norm(np.ptp(surfaces[0].mesh.vertices, axis=0))
+        for obj, layout, there in ((source, layouts[0], on_source), (target, layouts[1], found.matrix() @ on_source)):
             known = np.isfinite(layout.disc)
-            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, layout.disc, 0)), known)
+            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, layout.disc, 0), there), known)
         places = [_world(obj) for obj in (source, target)]
         some = found.matched if found.matched.any() else found.face >= 0
         pose = similarity(places[1][some], (found.matrix() @ places[0])[some])

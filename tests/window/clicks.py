@@ -19,7 +19,7 @@ from typing import Any
 from mathutils import Euler, Vector
 
 SHOTS = Path(os.environ["MOBIUS_SHOTS"])
-STEP = 9
+STEP = 12
 """Pixels between places where a button is looked for; a row is twenty high."""
 
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
@@ -51,7 +51,9 @@ def steps() -> Wait:
         start = time.perf_counter()
         escape()
         yield from until(lambda: Job.current is None, every=0.02)
-        print(f"[clicks] ESC while '{stage}': over after {time.perf_counter() - start:.2f} s", flush=True)
+        spent = time.perf_counter() - start
+        idle = yield from idle_round()
+        print(f"[clicks] ESC while '{stage}': over after {spent:.2f} s; idle rounds take {idle:.2f} s", flush=True)
         assert (state(source), state(target)) == before, "a stopped alignment has changed something"
         yield 0.3
 
@@ -66,7 +68,7 @@ def steps() -> Wait:
     aligned = state(source), state(target)
     yield from picture("aligned")
 
-    transfer = yield from find("bpy.ops.mobius.transfer")
+    transfer = yield from find("bpy.ops.mobius.transfer", upwards=True)
     yield from click_on(transfer)
     yield from until(lambda: Job.current is None and state(target) != aligned[1])
     assert {group.name for group in source.vertex_groups} <= {group.name for group in target.vertex_groups}
@@ -153,6 +155,14 @@ def until(happened: Any, every: float = 0.1) -> Wait:
         yield every
 
 
+def idle_round() -> Any:
+    """Return how long the window takes to draw itself and look at its events when nothing is to be done."""
+    start = time.perf_counter()
+    yield 0.02
+    yield 0.02
+    return (time.perf_counter() - start) / 2
+
+
 def picture(name: str) -> Wait:
     yield 1.2
     shot(str(SHOTS / f"{name}.png"))
@@ -194,17 +204,16 @@ def click_on(place: tuple[int, int]) -> Wait:
     over_the_viewport()
 
 
-def find(command: str, keys: str = "ctrl+c") -> Any:
-    """Return where the sidebar's button of a command is: move the mouse down and ask at each place."""
+def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False) -> Any:
+    """Return where the sidebar's button of a command is: move the mouse along and ask at each place."""
     sidebar = region("UI")
     x = sidebar.x + (sidebar.width - 24) // 2
     top = screen_height() - (sidebar.y + sidebar.height)
-    for y in range(top + 30, top + sidebar.height - 5, STEP):
+    places = range(top + 30, top + sidebar.height - 5, STEP)
+    for y in reversed(places) if upwards else places:
         bpy.context.window_manager.clipboard = ""
-        pointer("mousemove", x - 2, y, "mousemove", x, y)
-        yield 0.12
-        pointer("key", keys)
-        yield 0.08
+        pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", keys)
+        yield 0.1
         if bpy.context.window_manager.clipboard.startswith(command):
             print(f"[clicks] {command} is at {x}, {y}", flush=True)
             return x, y

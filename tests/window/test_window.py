@@ -46,10 +46,16 @@ def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest,
     extension = request.getfixturevalue("extension")
     shots = Path(os.environ.get("MOBIUS_SHOTS", tmp_path)) / suite
     shots.mkdir(parents=True, exist_ok=True)
-    settings = {"SUITE": suite, "GUI_TAB": "Möbius", "GUI_SIZE": "1600x1300", "MOBIUS_SHOTS": str(shots)}
+    settings = {
+        "SUITE": suite,
+        "GUI_TAB": "Möbius",
+        "GUI_SIZE": "1600x1300",
+        "GUI_TIMEOUT": "600",
+        "MOBIUS_SHOTS": str(shots),
+    }
     done = subprocess.run(
         [GUI, extension, HERE / "clicks.py", shots / "end.png"],
-        env=os.environ | settings, capture_output=True, text=True, check=False,
+        env=os.environ | settings | {"MOBIUS_SHOTS": str(shots)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     sys.stdout.write("".join(f"{line}\n" for line in done.stdout.splitlines() if line.startswith("[clicks]")))
     assert done.returncode == 0, done.stdout + done.stderr
