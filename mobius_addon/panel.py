@@ -283,6 +283,12 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append((iface_("Not Mirrored") if reflected else iface_("Mirrored"), _behind(margin)))
     if (margin := found["rival_margin"]) is not None:
         rows.append((iface_("Next Rival"), _behind(margin)))
+    if (parts := found["overlap"]) is not None:
+        rows += [
+            (iface_("Shared Source"), f"{parts['source_share']:.0%}"),
+            (iface_("Shared Target"), f"{parts['target_share']:.0%}"),
+            (iface_("Value There"), iface_("{:.2f} of {:.2f}").format(parts["value"], parts["upper_bound"])),
+        ]
     rows.append((iface_("Time"), iface_("{:.1f} s").format(sum(found["seconds"].values()))))
     return rows
 

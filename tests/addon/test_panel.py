@@ -136,6 +136,11 @@ def test_the_result_stands_where_a_pair_is_aligned(pair: tuple[Any, Any]) -> Non
     found = aligned_report(pair[1])
     for text in ("Certified: none matches more", f"{found['value']:.2f}", f"{found['matches']} of 12", "not mirrored"):
         assert text in said
+    parts = {"source_share": 0.9, "target_share": 0.75, "value": 7.0, "upper_bound": 7.5}
+    pair[1].data.mobius_alignment.report = json.dumps(found | {"overlap": parts})
+    said = drawn(panel.MOBIUS_PT_result)
+    for text in ("90%", "75%", "7.00 of 7.50"):
+        assert text in said
     pair[1].data.mobius_alignment.report = "{"
     assert drawn(panel.MOBIUS_PT_result) == ["Damaged: press Align again"]
 

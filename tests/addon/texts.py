@@ -30,7 +30,7 @@ def of_classes() -> set[str]:
 
 
 def of_code() -> set[str]:
-    """Texts in calls that translate, in `text=` and `heading=` of layouts, and the stages that the solver tells."""
+    """Texts in calls that translate, and in `text=` and `heading=` of layouts."""
     found: set[str] = set()
     for path in sorted((ROOT / "mobius_addon").glob("**/*.py")):
         if "demo" not in path.parts and path.name != "german.py":
@@ -42,9 +42,6 @@ def of_code() -> set[str]:
                     for keyword in call.keywords:
                         if keyword.arg in ("text", "heading"):
                             found |= set(_constants(keyword.value))
-    for call in _calls(ROOT / "solver" / "align.py"):
-        if getattr(call.func, "attr", "") == "begin":
-            found |= set(_constants(call.args[1]))
     return {text for text in found if text.strip()}
 
 

@@ -45,9 +45,7 @@ def steps() -> Wait:
         yield from click_on(align)
         yield from until(lambda stage=stage: stage_now() == stage)
         assert (state(source), state(target)) == before
-        if stage == "Searching":
-            yield from until(lambda: Job.current is None or Job.current.progress.value)
-            yield from picture("searching")
+        assert Job.current is not None, f"'{stage}' was over too soon to be stopped"
         start = time.perf_counter()
         escape()
         yield from until(lambda: Job.current is None, every=0.02)
@@ -58,7 +56,8 @@ def steps() -> Wait:
         yield 0.3
 
     yield from click_on(align)
-    yield from until(lambda: Job.current is not None)
+    yield from until(lambda: Job.current is not None and Job.current.progress.value)
+    yield from picture("searching", 0.1)
     yield from until(lambda: Job.current is None)
     yield 0.5
     found = json.loads(target.data.mobius_alignment.report)
@@ -163,8 +162,8 @@ def idle_round() -> Any:
     return (time.perf_counter() - start) / 2
 
 
-def picture(name: str) -> Wait:
-    yield 1.2
+def picture(name: str, wait: float = 1.2) -> Wait:
+    yield wait
     shot(str(SHOTS / f"{name}.png"))
 
 
