@@ -32,7 +32,7 @@
 #define RASTER_GAP 256 /* stretches */
 #define FEW_PAIRS 0.25
 #define ALIKE 4        /* stretches that a good rotation may be off */
-#define LOOKS 16       /* at the rotations of one z */
+#define LOOKS 32       /* at the rotations of one z */
 #define SHARP 0x1p-26  /* turns */
 #define STACK 2048     /* open cells of one subtree */
 #define CLUSTERS 8     /* windows that the rotations left in one cell are cut into */
@@ -916,44 +916,48 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
                              const double *width, double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
-        Open open[LOOKS * CLUSTERS + 1];
-        int64_t top = 0;
-        int depth = 1, raster = p->raster || p->own;
-        open[0] = (Open){{x[i], y[i], 0, 0, 0, from[i], width[i], 0x1p40}, 0, -1, 0};
+        double overstated = 0x1p40; /* the bound over the whole window */
         turns[i] = bounds[i] = 0;
-        for (int looks = 0; depth && looks < LOOKS; looks++) {
-            Open seen = open[--depth];
-            Node node = seen.node;
-            if (node.bound <= value) continue;
-            Outcome out;
-            const Entry *list = seen.entries < 0 ? 0 : w.arena + seen.offset;
-            Entry *children = raster || list ? 0 : w.arena + top;
-            /* coarse stretches overstate: the best of them need not hold the best rotation, so all that are nearly as good are
-               kept until they no longer shrink */
-            int strict = !raster && (seen.free || node.width < 0x1p-6);
-            Query query = {&node, value, raster, list, seen.entries, children, w.room - top, ALIKE, strict ? 1 : 0.85};
-            evaluate(p, &w, &query, &out);
-            if (children && out.entries > 0) { seen.offset = top; seen.entries = out.entries; top += out.entries; }
-            int base = depth;
-            for (int c = 0; c < out.clusters; c++) {
-                Open next = seen;
-                next.node.from = out.cluster_from[c]; next.node.width = out.cluster_width[c];
-                next.node.bound = out.cluster_bound[c];
-                if (next.node.width > FULL) { next.node.from = node.from; next.node.width = node.width; }
-                int k = depth++;
-                while (k > base && open[k - 1].node.bound > next.node.bound) { open[k] = open[k - 1]; k--; }
-                open[k] = next;
+        /* Coarse stretches overstate: the best of them need not hold the best rotation, so all that are nearly as good are
+           kept until they no longer shrink; and those that are less good too if none turns out to hold what it seemed to. */
+        for (double share = 0.85; share > 0.4 && overstated > value; share -= 0.3) {
+            Open open[LOOKS * CLUSTERS + 1];
+            int64_t top = 0;
+            int depth = 1, raster = p->raster || p->own;
+            open[0] = (Open){{x[i], y[i], 0, 0, 0, from[i], width[i], 0x1p40}, 0, -1, 0};
+            for (int looks = 0; depth && looks < LOOKS; looks++) {
+                Open seen = open[--depth];
+                Node node = seen.node;
+                if (node.bound <= value) continue;
+                Outcome out;
+                const Entry *list = seen.entries < 0 ? 0 : w.arena + seen.offset;
+                Entry *children = raster || list ? 0 : w.arena + top;
+                int strict = !raster && (seen.free || node.width < 0x1p-6), base = depth;
+                Query query = {&node, value, raster, list, seen.entries, children, w.room - top, ALIKE, strict ? 1 : share};
+                evaluate(p, &w, &query, &out);
+                if (looks == 0) overstated = out.bound;
+                if (children && out.entries > 0) { seen.offset = top; seen.entries = out.entries; top += out.entries; }
+                for (int c = 0; c < out.clusters; c++) {
+                    Open next = seen;
+                    next.node.from = out.cluster_from[c]; next.node.width = out.cluster_width[c];
+                    next.node.bound = out.cluster_bound[c];
+                    if (next.node.width > FULL) { next.node.from = node.from; next.node.width = node.width; }
+                    int k = depth++;
+                    while (k > base && open[k - 1].node.bound > next.node.bound) { open[k] = open[k - 1]; k--; }
+                    open[k] = next;
+                }
+                if (raster || !out.clusters) { raster = 0; continue; }
+                Node best = open[depth - 1].node;
+                int shrinks = best.width > SHARP && best.width < 0.9 * node.width;
+                if (shrinks || !strict) {
+                    if (!shrinks) for (int k = base; k < depth; k++) open[k].free = 1;
+                    continue;
+                }
+                depth = base;
+                turns[i] = best.from + 0.5 * best.width;
+                bounds[i] = value = best.bound;
             }
-            if (raster || !out.clusters) { raster = 0; continue; }
-            Node best = open[depth - 1].node;
-            int shrinks = best.width > SHARP && best.width < 0.9 * node.width;
-            if (shrinks || !strict) {
-                if (!shrinks) for (int k = base; k < depth; k++) open[k].free = 1;
-                continue;
-            }
-            depth = base;
-            turns[i] = best.from + 0.5 * best.width;
-            bounds[i] = value = best.bound;
+            overstated = least(overstated * share, overstated - 1); /* the most that was left out */
         }
     }
 }

@@ -145,22 +145,23 @@ def test_bound_of_a_window_exceeds_the_value_at_every_rotation_in_it(raster, see
             assert problem.value(Mobius(z[k], theta)) <= bounds[k]
 
 
-@settings(max_examples=60, deadline=None)
-@given(SEEDS)
-def test_best_rotations_are_the_same(seed):
-    rng = np.random.default_rng(seed)
-    problem = random_problem(rng)
-    z = disc_points(rng, 12, 0.98)
-    kernels = CompiledKernels(problem, 0.99, SMALLEST_CELL)
-    values, rotations = (
-        np.concatenate(x) for x in zip(*(kernels.rotations(z[k : k + 1]) for k in range(12)), strict=True)
-    )
-    exact = best_rotations(problem, z)[0]
-    reached = np.array([problem.value(Mobius(x, t)) for x, t in zip(z.tolist(), rotations.tolist(), strict=True)])
-    assert (reached <= values).all()
-    assert (reached <= exact).all()
-    # of several stretches that look best the widest is taken, which need not hold the best rotation
-    assert np.mean(reached == exact) >= 0.5
+def test_best_rotations_are_the_same():
+    missed = 0
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        problem = random_problem(rng)
+        z = disc_points(rng, 12, 0.98)
+        kernels = CompiledKernels(problem, 0.99, SMALLEST_CELL)
+        values, rotations = (
+            np.concatenate(x) for x in zip(*(kernels.rotations(z[k : k + 1]) for k in range(12)), strict=True)
+        )
+        exact = best_rotations(problem, z)[0]
+        reached = np.array([problem.value(Mobius(x, t)) for x, t in zip(z.tolist(), rotations.tolist(), strict=True)])
+        assert (reached <= values).all()
+        assert (reached <= exact).all()
+        missed += np.count_nonzero(reached < exact)
+    # of the stretches that look as good only the most promising are looked at: the search needs a good value, not each
+    assert missed <= 0.04 * 150 * 12
 
 
 @settings(max_examples=60, deadline=None)
