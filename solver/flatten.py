@@ -104,15 +104,14 @@ def flatten(
     if turned:
         disc = untangled(surface.faces, surface.lengths, disc, boundary)
     result = np.full(len(mesh.vertices), complex(np.nan, np.nan))
-    used = np.unique(mesh.faces)
-    result[used] = disc[used]
+    result[mesh.used] = disc[: len(result)][mesh.used]
     return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh))
 
 
 def _centred(disc: Complexes, mesh: TriangleMesh) -> Complexes:
     """Return the disc moved so that the conformal barycentre of the mesh's vertices, by their area, is 0."""
-    used = np.unique(mesh.faces)
-    return Mobius(conformal_barycentre(disc[used], mesh.vertex_areas[used]), 0.0)(disc)
+    placed = disc[: len(mesh.vertices)][mesh.used]
+    return Mobius(conformal_barycentre(placed, mesh.vertex_areas[mesh.used]), 0.0)(disc)
 
 
 def _turned(disc: Complexes, mesh: TriangleMesh) -> int:

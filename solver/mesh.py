@@ -94,6 +94,13 @@ class TriangleMesh:
         return np.bincount(self.faces.ravel(), third, len(self.vertices)).astype(np.float64, copy=False)
 
     @cached_property
+    def used(self) -> Booleans:
+        """Whether each vertex is in a face, (n,)."""
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        return used
+
+    @cached_property
     def edge_lengths(self) -> Floats:
         """Length of the side opposite each corner, (m, 3), in length units."""
         low, high = self.edges.T
@@ -123,8 +130,7 @@ class TriangleMesh:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box diagonal of the vertices in use, in length units."""
-        used = self.vertices[np.unique(self.faces)]
-        return float(np.linalg.norm(np.ptp(used, axis=0)))
+        return float(np.linalg.norm(np.ptp(self.vertices[self.used], axis=0)))
 
     def vertex_normals(self) -> Floats:
         """Unit normal of each vertex, (n, 3), area weighted; zero at vertices in no face."""

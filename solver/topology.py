@@ -119,14 +119,10 @@ def topology(mesh: TriangleMesh) -> Topology:
     n, faces = len(mesh.vertices), mesh.faces
     a, b, c = faces.T
     degenerate = (a == b) | (b == c) | (c == a)
-    # three vertices are an edge and the smallest vertex, which is opposite it
-    opposite_a, opposite_b, opposite_c = mesh.edge_of_side.reshape(-1, 3).T
-    smallest = np.minimum(np.minimum(a, b), c)
-    key = np.where(smallest == a, opposite_a, np.where(smallest == b, opposite_b, opposite_c)) * n + smallest
     duplicate = np.zeros(len(faces), bool)
-    if (np.diff(np.sort(key)) == 0).any():
+    if _may_have_duplicates(mesh):
         duplicate[:] = True
-        duplicate[np.unique(key, return_index=True)[1]] = False
+        duplicate[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]] = False
     proper = ~degenerate & ~duplicate
     flat = proper & (mesh.face_areas <= 1e-12 * np.maximum.reduce(mesh.edge_lengths.T) ** 2)
 
@@ -137,8 +133,6 @@ def topology(mesh: TriangleMesh) -> Topology:
     side_count = np.bincount(edge_of_side, minlength=len(edges))
     forward = np.bincount(edge_of_side, ascending, minlength=len(edges))
 
-    used = np.zeros(n, bool)
-    used[faces] = True
     in_proper = np.zeros(n, bool)
     in_proper[simple] = True
     starts = np.concatenate([[0], np.cumsum(np.bincount(edges[:, 0], minlength=n))])
@@ -155,7 +149,7 @@ def topology(mesh: TriangleMesh) -> Topology:
     lengths = [float(np.linalg.norm(mesh.vertices[x] - mesh.vertices[np.roll(x, -1)], axis=1).sum()) for x in loops]
     ranked = sorted(range(len(loops)), key=lambda k: (-len(loops[k]), -lengths[k]))
     return Topology(
-        vertices=int(used.sum()),
+        vertices=int(mesh.used.sum()),
         parts=parts,
         boundary_loops=tuple(loops[k] for k in ranked),
         loop_lengths=tuple(lengths[k] for k in ranked),
@@ -165,7 +159,7 @@ def topology(mesh: TriangleMesh) -> Topology:
         degenerate_faces=np.flatnonzero(degenerate),
         zero_area_faces=np.flatnonzero(flat),
         duplicate_faces=np.flatnonzero(duplicate & ~degenerate),
-        unused_vertices=np.flatnonzero(~used),
+        unused_vertices=np.flatnonzero(~mesh.used),
         inconsistent_edges=edges[(side_count == 2) & (forward != 1)],
     )
 
@@ -182,6 +176,14 @@ def require_disc(mesh: TriangleMesh, *, fill_holes: bool = False) -> Topology:
     if problems := found.problems(fill_holes=fill_holes):
         raise MeshError(f"'{mesh.name}' " + "; it ".join(problems))
     return found
+
+
+def _may_have_duplicates(mesh: TriangleMesh) -> bool:
+    """Return False only if no two faces have the same vertices: at no edge are two faces with one vertex opposite."""
+    paired = mesh.twins >= 0
+    opposite = mesh.faces.ravel()
+    several = np.bincount(mesh.edge_of_side).max() > 2
+    return bool(several or (opposite[mesh.twins[paired]] == opposite[paired]).any())
 
 
 def _fans(edge_of_side: Integers, ascending: Booleans, twins: Integers | None) -> Integers:
