@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import isotonic_regression
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 from scipy.spatial.transform import Rotation
 
 from .agreement import weighted_median
@@ -72,7 +72,7 @@ SOLVER_STEPS = 12
 """Conjugate gradient steps per round; the next round begins where they end, so more change nothing."""
 
 
-REPAIR_ROUNDS = 60
+REPAIR_ROUNDS = 20
 """Attempts to unfold, each on patches one ring larger."""
 
 
@@ -482,42 +482,91 @@ def _injective(
 ) -> tuple[Complexes, int]:
     """Return the map with no triangle turned over or collapsed, and how many vertices were moved for it.
 
-    The boundary is put in order first. Then the vertices around what is turned over become those means of their
-    neighbours that they are in the Möbius map, so that their displacement from it is interpolated; such patches grow
-    while they hold a turned triangle. Where that does not help within half the rounds, they step back to the Möbius
-    map itself, which is injective.
+    The boundary is put in order first, and the displacement from the Möbius map interpolated across patches around what
+    is turned over (`_interpolated`). Where these do not come to an end, the displacement fades around them: by
+    quarters, and over ever wider surroundings, until at last the Möbius map itself is left, which is injective.
     """
-    result = carried.copy()
-    result[boundary] = _in_order(carried[boundary], conformal[boundary])
-    size = len(carried)
+    ordered = carried.copy()
+    ordered[boundary] = _in_order(carried[boundary], conformal[boundary])
     links = mean_value_weights(conformal, faces)
+    result = _interpolated(ordered, conformal, faces, links, boundary, holes)
+    turned = _turned(result, faces)
+    near = np.zeros(len(carried), bool)
+    reach = 0.0
+    while turned.any():
+        near[faces[turned]] = True
+        # steep enough fading would turn triangles over by itself
+        reach = max(2 * reach, 4 * float(np.abs(ordered - conformal)[near].max()), 1e-3)
+        distance = np.full(len(carried), np.inf)
+        used = np.flatnonzero(np.isfinite(conformal.real))
+        tree = KDTree(np.stack([conformal[near].real, conformal[near].imag], axis=1))
+        distance[used] = tree.query(np.stack([conformal[used].real, conformal[used].imag], axis=1))[0]
+        share = np.clip(2 - 2 * distance / reach, 0, 1)
+        for quarters in range(1, 5):
+            faded = ordered - quarters / 4 * share * (ordered - conformal)
+            result = (
+                faded
+                if quarters == 4 and share[used].min() == 1
+                else _interpolated(faded, conformal, faces, links, boundary, holes)
+            )
+            turned = _turned(result, faces)
+            if not turned.any():
+                break
+        if reach > 8:
+            break
+    return result, int((np.abs(result - carried) > 0).sum())
+
+
+def _interpolated(
+    start: Complexes,
+    conformal: Complexes,
+    faces: Integers,
+    links: csr_array,
+    boundary: Integers,
+    holes: tuple[Integers, ...],
+) -> Complexes:
+    """Return the map with its displacement from the Möbius map interpolated across patches around turned triangles.
+
+    Inside, vertices become those means of their neighbours that they are in the Möbius map; on the boundary the
+    logarithm of the ratio to it is linear in the angle between the vertices that stay. Patches grow, a ring at a time,
+    where they hold a turned triangle; one that is the whole disc holds none (Floater 2003), if there are no openings.
+    """
+    size = len(start)
     inside = np.zeros(size, bool)
     inside[faces] = True
     inside[np.concatenate([boundary, *holes])] = False
-    ordered, back, free = result.copy(), np.zeros(size), np.zeros(size, bool)
-    for attempt in range(REPAIR_ROUNDS):
+    result, free = start, np.zeros(size, bool)
+    for _ in range(REPAIR_ROUNDS):
         turned = _turned(result, faces)
         if not turned.any():
             break
         near = np.zeros(size, bool)
         near[faces[turned]] = True
         free |= near | (links @ (near & free) > 0)
-        if attempt >= REPAIR_ROUNDS // 2:
-            back[near] = np.minimum(back[near] + 0.25, 1)
-            back[links @ near > 0] = np.maximum(back[links @ near > 0], 0.1)
-            ordered = np.where(back > 0, result + back * (conformal - result), ordered)
-        patch = np.flatnonzero(free & inside & (back == 0))
-        result = ordered.copy()
+        result = start.copy()
+        result[boundary] = _along_boundary(start[boundary], conformal[boundary], free[boundary])
+        patch = np.flatnonzero(free & inside)
         if patch.size:
             rows = links[patch]
-            held = np.where(np.isfinite(ordered.real), ordered, 0)
+            held = np.where(np.isfinite(result.real), result, 0)
             held[patch] = 0
             pulled = rows @ np.stack([held.real, held.imag], axis=1)
             mean = factorised(csc_array(diags_array(rows.sum(axis=1)) - rows[:, patch]))(pulled)
             result[patch] = mean[:, 0] + 1j * mean[:, 1]
-    else:
-        result = conformal
-    return result, int((np.abs(result - carried) > 0).sum())
+    return result
+
+
+def _along_boundary(places: Complexes, conformal: Complexes, free: Booleans) -> Complexes:
+    """Return boundary places, (k,), the free ones' log ratio to the Möbius map's interpolated between the others'."""
+    if not free.any():
+        return places
+    ratio = np.log(places / conformal)
+    if free.all():
+        return conformal * np.exp(ratio.mean())
+    angle = np.abs(np.unwrap(np.angle(conformal / conformal[0])))
+    held = np.flatnonzero(~free)
+    filled = [np.interp(angle, angle[held], part[held], period=2 * np.pi) for part in (ratio.real, ratio.imag)]
+    return np.where(free, conformal * np.exp(filled[0] + 1j * filled[1]), places)
 
 
 def _in_order(carried: Complexes, conformal: Complexes) -> Complexes:

@@ -112,6 +112,47 @@ def test_folds_are_undone_near_where_they_are(source):
     assert moved == (result != tangled).sum()
 
 
+def swirled(disc: np.ndarray) -> np.ndarray:
+    """The inside turned by two and a half radians, the boundary not."""
+    return disc * np.exp(2.5j * (1 - np.abs(disc)))
+
+
+def noisy(disc: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(8)
+    return disc + 0.1 * (rng.normal(size=len(disc)) + 1j * rng.normal(size=len(disc)))
+
+
+HARD = {
+    "all in one point": lambda disc: np.full_like(disc, 0.3 + 0.1j),
+    "overhanging": lambda disc: np.minimum(disc.real, 0.3) + 1j * disc.imag,
+    "pleated": lambda disc: disc + 0.2 * np.sin(15 * disc.real),
+    "mirrored": np.conj,
+    "noisy": noisy,
+    "swirled": swirled,
+}
+
+
+@pytest.mark.parametrize("holes", [0, 1])
+@pytest.mark.parametrize("kind", HARD)
+def test_hard_maps_become_injective(source, kind, holes):
+    """Whatever closest points gave: no triangle is turned over or collapsed, also around an opening."""
+    flattening = source
+    if holes:
+        mesh = source.mesh
+        away = np.hypot(*(mesh.vertices[mesh.faces].mean(axis=1)[:, :2] - [0.2, 0.1]).T) > 0.15
+        flattening = flatten(TriangleMesh(mesh.vertices, mesh.faces[away]), fill_holes=True)
+    faces = flattening.mesh.faces
+    used = np.unique(faces)
+    disc = flattening.disc.copy()
+    disc[used] = HARD[kind](disc[used])
+    disc[used] /= np.maximum(np.abs(disc[used]), 1)
+    assert len(flattening.holes) == holes
+    result, moved = _injective(disc, flattening.disc, faces, flattening.boundary, flattening.holes)
+    assert (signed_areas(result, faces) > 0).all()
+    assert np.abs(result[used]).max() < 1 + 1e-9
+    assert moved == (np.abs(result - disc)[used] > 0).sum()
+
+
 def test_the_boundary_is_put_in_order():
     conformal = np.exp(2j * np.pi * np.arange(40) / 40)
     moved = conformal * np.exp(0.3j * np.sin(3 * np.angle(conformal)))
