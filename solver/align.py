@@ -12,8 +12,8 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from .agreement import trust
-from .baselines.fit import algebraic_fit
 from .descriptors import diffused_mean_curvature, standardised
+from .fit import algebraic_fit
 from .flatten import Flattening, flatten
 from .landmarks import usable_landmarks, with_landmarks
 from .locate import TriangulatedDisc

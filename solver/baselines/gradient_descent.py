@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
+from ..fit import images, parameters, residuals, transformation
 from ..mesh import Complexes, Floats
 from ..mobius import Mobius
 from ..search import SearchProgress, SearchResult
-from .fit import images, parameters, residuals, transformation
 from .incumbent import Incumbent, incumbent
 
 

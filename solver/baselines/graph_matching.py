@@ -13,10 +13,10 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array, vstack
 
+from ..fit import algebraic_fit, fitted
 from ..measures import distances
 from ..mesh import Complexes, Floats, Integers
 from ..search import SearchProgress, SearchResult
-from .fit import algebraic_fit, fitted
 from .incumbent import Incumbent, incumbent
 
 LARGEST_RADIUS = 0.5

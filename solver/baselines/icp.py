@@ -10,10 +10,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from ..fit import fitted
 from ..measures import distances
 from ..mobius import Mobius
 from ..search import SearchProgress, SearchResult
-from .fit import fitted
 from .incumbent import incumbent
 
 

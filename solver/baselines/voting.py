@@ -11,10 +11,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from ..fit import residuals
 from ..mesh import Complexes, Floats, Integers
 from ..mobius import Mobius
 from ..search import SearchProgress, SearchResult
-from .fit import residuals
 from .incumbent import Incumbent, incumbent
 
 DISTANCES_AT_ONCE = 1 << 18

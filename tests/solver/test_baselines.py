@@ -5,10 +5,10 @@ from scipy.optimize import approx_fprime
 
 from solver import Mobius, search
 from solver.baselines import brute_force, gradient_descent, graph_matching, icp, voting
-from solver.baselines.fit import algebraic_fit, fitted, images, parameters, transformation
 from solver.baselines.gradient_descent import _unmatched
 from solver.baselines.incumbent import incumbent
 from solver.baselines.voting import through_two_pairs
+from solver.fit import algebraic_fit, fitted, images, parameters, transformation
 from solver.matching import matching
 from solver.mobius import hyperbolic_distance
 

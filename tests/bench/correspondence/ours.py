@@ -9,8 +9,8 @@ from scipy.spatial import KDTree
 
 from solver import Alignment, AlignSettings, Mobius, align, correspond, search
 from solver.align import _samples
-from solver.baselines.fit import algebraic_fit, fitted
 from solver.descriptors import diffused_mean_curvature, standardised
+from solver.fit import algebraic_fit, fitted
 from solver.locate import TriangulatedDisc
 
 from .pairs import Pair, nearest

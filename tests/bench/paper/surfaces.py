@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solver import Mobius, TriangleMesh, align
-from solver.baselines.fit import algebraic_fit, fitted
+from solver.fit import algebraic_fit, fitted
 from solver.measures import q_truth
 from solver.mobius import conformal_barycentre
 

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..mesh import Complexes, Floats
-from ..mobius import Mobius
+from .mesh import Complexes, Floats
+from .mobius import Mobius
 
 
 def parameters(mobius: Mobius, z_max: float) -> Floats:
