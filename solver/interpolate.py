@@ -204,9 +204,11 @@ class CornerInterpolation:
         result = np.zeros(int(self.groups.max()) + 1, bool)
         if not charts.seam.any():
             return result
-        face = self.correspondence.face
+        face, weights = self.correspondence.face, self.correspondence.barycentric
         known = face >= 0
-        touching = known & charts.seam[charts.triangles].any(axis=1)[face]
+        # inside one island a vertex has one value, but for slits and for what lies on the seam itself
+        on_seam = (weights * ~charts.seam[charts.triangles][face]).sum(axis=1) < 1e-9
+        touching = known & (on_seam | charts.slit[charts.triangles].any(axis=1)[face])
         island = np.where(known, charts.island[face], -1)
         a, b, c = (island[self.target_triangles[:, k]] for k in range(3))
         across = ((a != b) & (a >= 0) & (b >= 0)) | ((b != c) & (b >= 0) & (c >= 0)) | ((c != a) & (c >= 0) & (a >= 0))
@@ -372,7 +374,7 @@ def nearest_orthogonal(matrices: Floats) -> Floats:
         step = 0.5 * (balance * factor + inverse / balance)
         change = np.abs(step - factor).max()
         factor = step
-        if change < 1e-15:
+        if change < 1e-8:  # it converges quadratically
             break
     left, _, right = np.linalg.svd(matrices[odd])
     left[np.sign(np.linalg.det(left @ right)) != wanted, :, 2] *= -1
