@@ -73,15 +73,17 @@ def steps() -> Wait:
     assert {group.name for group in source.vertex_groups} <= {group.name for group in target.vertex_groups}
     assert target.data.shape_keys.key_blocks.keys() == source.data.shape_keys.key_blocks.keys()
     yield from picture("transferred")
+    names = source.name, target.name
     for expected in (aligned, before):
         undo()
         yield 1.0
-        source, target = bpy.data.objects[source.name], bpy.data.objects[target.name]
-        assert (state(source), state(target)) == expected, "one undo takes back one step"
-    redo()
-    yield 0.5
+        # undo has made the objects anew
+        assert tuple(state(bpy.data.objects[name]) for name in names) == expected, "one undo takes back one step"
     redo()
     yield 1.0
+    redo()
+    yield 1.0
+    assert state(bpy.data.objects[names[1]])["keys"], "redo brings the transfer back"
 
     view = bpy.context.window_manager.mobius_view
     view.matches = True
@@ -96,6 +98,7 @@ def steps() -> Wait:
     bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
     yield 0.5
     assert bpy.context.space_data.local_view is None
+    view.matches, view.lines = True, 0.3
     bpy.ops.mobius.show_discs()
     yield from picture("discs")
     bpy.context.preferences.view.language = "de_DE"
