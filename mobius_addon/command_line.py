@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..solver import Alignment, AlignSettings, Correspondence
+    from ..solver import Alignment, AlignSettings, Correspondence, TriangleMesh
+    from ..solver.mesh import Integers
     from .attributes import Transfer, TransferSettings
     from .files import Imported
     from .mesh_data import Surface
@@ -189,6 +190,15 @@ def _require_outer(vertex: int | None, options: argparse.Namespace, role: str, s
 def _add_align_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--reflect", choices=("auto", "never", "always"), help="is one the mirror image of the other?")
     group.add_argument("--refine", choices=("dense", "mobius", "none"), help="what follows the proven map")
+    group.add_argument(
+        "--take-rival", action="store_true", default=None, help="of an ambiguous pair, the best map but one"
+    )
+    group.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        type=Path,
+        help="known pairs, one on each line: two vertex numbers, or x y z on the source and x y z on the target",
+    )
     group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
     group.add_argument("--targets", type=int, metavar="N", help="target points of the search")
     group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")
@@ -263,7 +273,7 @@ def _align_settings(options: argparse.Namespace) -> AlignSettings:
     from ..solver import AlignSettings
     from .files import Unreadable
 
-    names = ("reflect", "refine", "samples", "targets", "radius", "z_max", "time_limit")
+    names = ("reflect", "refine", "take_rival", "samples", "targets", "radius", "z_max", "time_limit")
     names += ("fill_holes", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "time_limit" in given:
@@ -484,12 +494,28 @@ def _aligned(
     source, target = surfaces
     _require_outer(settings.source_outer, options, "--source-outer", source)
     _require_outer(settings.target_outer, options, "--target-outer", target)
-    alignment, correspondence = aligned(source.mesh, target.mesh, settings, largest_part=options.largest_part)
+    pairs = _landmarks(options, (source.mesh, target.mesh))
+    alignment, correspondence = aligned(
+        source.mesh, target.mesh, settings, largest_part=options.largest_part, landmarks=pairs
+    )
     for warning in alignment.warnings:
         say_error(f"mobius: warning: {warning}")
     say(summary(options.source, options.target, alignment, correspondence))
     say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
     return alignment, correspondence
+
+
+def _landmarks(options: argparse.Namespace, meshes: tuple[TriangleMesh, TriangleMesh]) -> Integers | None:
+    """Return the pairs of the file that was given, if any."""
+    from .files import Unreadable
+    from .landmarks import from_file
+
+    if options.landmarks is None:
+        return None
+    try:
+        return from_file(options.landmarks, meshes)
+    except OSError as error:
+        raise Unreadable(f"'{options.landmarks}' cannot be read: {error.strerror}") from error
 
 
 def _fitting_map(

@@ -25,7 +25,7 @@ from ..solver import (
     flatten,
     topology,
 )
-from ..solver.mesh import Booleans, plural
+from ..solver.mesh import Booleans, Integers, plural
 from .mesh_data import Refusal
 
 
@@ -103,6 +103,7 @@ def aligned(
     settings: AlignSettings,
     *,
     largest_part: bool = False,
+    landmarks: Integers | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> tuple[Alignment, Correspondence]:
     """Return the alignment of two meshes put in order, and their correspondence in the triangles they came with.
@@ -111,7 +112,7 @@ def aligned(
     """
     repair = Repair(settings.fill_holes, largest_part)
     tidy_source, tidy_target = in_order(source, repair), in_order(target, repair)
-    alignment = align(tidy_source.mesh, tidy_target.mesh, settings, progress)
+    alignment = align(tidy_source.mesh, tidy_target.mesh, settings, progress, landmarks=landmarks)
     found = in_own_triangles(correspond(alignment), tidy_source, source)
     notes = (
         *_changes(source, tidy_source),

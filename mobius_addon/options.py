@@ -62,7 +62,7 @@ def outer_vertex(obj: bpy.types.Object, mesh: TriangleMesh, options: Any) -> int
 
 
 class AlignOptions:
-    """Mixin with the options of an alignment, named as in `solver.AlignSettings`."""
+    """Mixin with the options of an alignment, named as in `solver.AlignSettings`, and where landmarks come from."""
 
     reflect: bpy.props.EnumProperty(
         name="Mirrored",
@@ -83,6 +83,16 @@ class AlignOptions:
             ("none", "None", "Exactly the map of the certificate"),
         ),
         default=_DEFAULTS.refine,
+    )
+    landmarks: bpy.props.EnumProperty(
+        name="Landmarks",
+        description="Pairs of points that are known; a few wrong ones do no harm",
+        items=(
+            ("none", "None", "The surfaces alone decide"),
+            ("empties", "Empties", "Empties parented to source and target, with equal names but for .001 at the end"),
+            ("groups", "Vertex Groups", "Vertex groups of equal names with a single vertex on either mesh"),
+        ),
+        default="none",
     )
     samples: bpy.props.IntProperty(
         name="Samples",
@@ -129,7 +139,7 @@ def align_settings(
 
     A radius or time limit of 0 is none; `outer` are vertices on the outer loops of source and target.
     """
-    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS}
+    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name != "landmarks"}
     chosen |= {"radius": options.radius or None, "time_limit": time_limit or None}
     return AlignSettings(**chosen, fill_holes=options.fill_holes, source_outer=outer[0], target_outer=outer[1])
 

@@ -29,7 +29,7 @@ class MOBIUS_OT_align_preset_add(AddPresetBase, bpy.types.Operator):
     preset_menu = "MOBIUS_PT_align_presets"
     preset_subdir = MOBIUS_PT_align_presets.preset_subdir
     preset_defines = ["settings = bpy.context.scene.mobius"]
-    preset_values = [f"settings.{name}" for name in ALIGN_OPTIONS]
+    preset_values = [f"settings.{name}" for name in ALIGN_OPTIONS if name != "landmarks"]
 
 
 class MOBIUS_PT_transfer_presets(PresetPanel, bpy.types.Panel):

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from ... import solver
 from ...solver.mesh import Floats
-from .. import results, stored_alignment
+from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
@@ -60,12 +60,13 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         outer = outer_vertex(source, meshes[0], self), outer_vertex(target, meshes[1], self)
         options = replace(align_settings(self, limit, outer), take_rival=self.take_rival)
         largest_part = self.largest_part
-        asked = surfaces[0].fingerprint(), surfaces[1].fingerprint(), options, largest_part
+        pairs = landmarks.from_scene(source, target, meshes, self.landmarks)
+        asked = surfaces[0].fingerprint(), surfaces[1].fingerprint(), options, largest_part, pairs.tobytes()
 
         def work(report: Report) -> Aligned:
             found = _last.get(asked)
             if found is None:
-                found = Aligned(*aligned(*meshes, options, largest_part=largest_part, progress=report))
+                found = Aligned(*aligned(*meshes, options, largest_part=largest_part, landmarks=pairs, progress=report))
                 _last.clear()
                 _last[asked] = found
             return found
@@ -174,14 +175,24 @@ def on_source(alignment: solver.Alignment, correspondence: solver.Correspondence
 
 def summary(source: str, target: str, alignment: solver.Alignment, correspondence: solver.Correspondence) -> str:
     """Return one sentence about an alignment: what matched, and what is proved about it."""
+    mirrored = ", mirrored" if alignment.mobius.reflected else ""
+    margin = "" if alignment.margin is None else f", {alignment.margin:.0%} ahead of the other orientation"
+    share = ""
+    if (overlap := alignment.overlap) is not None:
+        proven = _proof(overlap.alignment)
+        share = f"; in the {overlap.target_share:.0%} of the target that the source shows too {proven}"
+    return (
+        f"'{source}' on '{target}'{mirrored}: {_proof(alignment)}{margin}{share}; "
+        f"{correspondence.matched.mean():.0%} of the vertices matched"
+    )
+
+
+def _proof(alignment: solver.Alignment) -> str:
+    """Say what a search found and proved."""
     search = alignment.search
     proof = (
         f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more"
         if search.certified
         else f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
     )
-    mirrored = ", mirrored" if alignment.mobius.reflected else ""
-    return (
-        f"'{source}' on '{target}'{mirrored}: matched value {search.value:.2f} of at most "
-        f"{len(alignment.source_samples)}, {proof}; {correspondence.matched.mean():.0%} of the vertices matched"
-    )
+    return f"matched value {search.value:.2f} of at most {len(alignment.source_samples)}, {proof}"
