@@ -297,11 +297,15 @@ def _matched(
     clock.begin("flatten target", "Flattening the target", 0.1)
     target = flatten(target_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.target_outer)
     clock.begin("descriptors", "Measuring curvature", 0.2)
-    source_descriptors = standardised(diffused_mean_curvature(source_mesh), source_mesh.vertex_areas)
-    target_descriptors = standardised(diffused_mean_curvature(target_mesh), target_mesh.vertex_areas)
+    measured = diffused_mean_curvature(source_mesh, progress=clock.within(0.2, 0.25))
+    source_descriptors = standardised(measured, source_mesh.vertex_areas)
+    measured = diffused_mean_curvature(target_mesh, progress=clock.within(0.25, 0.3))
+    target_descriptors = standardised(measured, target_mesh.vertex_areas)
     clock.begin("sampling", "Choosing points", 0.3)
     source_samples = _samples(source, source_descriptors, settings.samples)
-    target_samples = farthest_points(target_mesh, settings.targets, np.empty(0, np.intp), _interior(target))
+    target_samples = farthest_points(
+        target_mesh, settings.targets, np.empty(0, np.intp), _interior(target), clock.within(0.3, 0.4)
+    )
     problem = _Problem(
         source.disc[source_samples],
         target.disc[target_samples],
@@ -328,7 +332,15 @@ def _matched(
     mobius = rival.mobius if settings.take_rival else found.mobius
     if settings.refine != "none":
         clock.begin("refine", "Refining", 0.9)
-        mobius = refined(mobius, source, target, source_descriptors, target_descriptors, settings.descriptor_scale)
+        mobius = refined(
+            mobius,
+            source,
+            target,
+            source_descriptors,
+            target_descriptors,
+            settings.descriptor_scale,
+            clock.within(0.9, 1.0),
+        )
     if not found.certified:
         share = 100 * found.gap / max(found.upper_bound, 1e-300)
         warnings.append(f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given")

@@ -5,10 +5,12 @@ They do not depend on pose, scale or triangulation, nor on orientation as long a
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
+from .cholesky import factorised
 from .laplacian import laplacian, mass
 from .mesh import Floats, TriangleMesh
 
@@ -16,11 +18,16 @@ DIFFUSION_TIMES = (0.0005, 0.002, 0.008, 0.03)
 """Diffusion times as fractions of the surface's area: from a fiftieth to a sixth of its width in standard deviation."""
 
 
-def diffused_mean_curvature(mesh: TriangleMesh, times: tuple[float, ...] = DIFFUSION_TIMES) -> Floats:
+def diffused_mean_curvature(
+    mesh: TriangleMesh,
+    times: tuple[float, ...] = DIFFUSION_TIMES,
+    progress: Callable[[float], None] | None = None,
+) -> Floats:
     """Return the mean curvature of the surface after diffusion, (n, len(times)), times the root of the area.
 
     Positions are diffused by one implicit step of (M + t A L) x_t = M x, as in Desbrun et al. (1999); mean curvature is
-    L x_t / (2 M) along the normal, positive where the surface is convex. 0 at vertices in no face.
+    L x_t / (2 M) along the normal, positive where the surface is convex. 0 at vertices in no face. `progress` is called
+    with the share of the work done, in [0, 1], and may raise to end it.
     """
     area = mesh.area
     stiffness, masses = laplacian(mesh), mesh.vertex_areas
@@ -30,10 +37,10 @@ def diffused_mean_curvature(mesh: TriangleMesh, times: tuple[float, ...] = DIFFU
     positions = mesh.vertices[used]
     result = np.zeros((len(mesh.vertices), len(times)))
     for k, t in enumerate(times):
-        system = csc_array(weights + (t * area) * inner)
-        factor = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        if progress:
+            progress(k / len(times))
         diffused = mesh.vertices.copy()
-        diffused[used] = factor.solve(weights @ positions)
+        diffused[used] = factorised(csc_array(weights + (t * area) * inner))(weights @ positions)
         normals = TriangleMesh(diffused, mesh.faces).vertex_normals()[used]
         vector = inner @ diffused[used]
         result[used, k] = (vector * normals).sum(axis=1) / (2 * masses[used]) * np.sqrt(area)

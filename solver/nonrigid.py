@@ -233,14 +233,18 @@ def finished(
     all_places[used] = _following(fine, TriangleMesh(unbent[fine], fine_faces), settled, target.disc, unbent, used)
     all_places[fine] = settled
     normals = TriangleMesh(all_places, draft.whole.faces).vertex_normals()
-    face, barycentric = onto.nearest_point(all_places[used], normals[used])
+    face, barycentric = onto.nearest_point(
+        all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
+    )
     reached = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
     offset = np.zeros(len(target.disc))
     offset[used] = np.linalg.norm(reached - all_places[used], axis=1)
     carried = conformal.copy()
     carried[used] = (source.disc[source.mesh.faces[face]] * barycentric).sum(axis=1)
     tell(0.95)
-    carried, repaired = _injective(carried, conformal, target.mesh.faces[:, order], target.boundary, target.holes)
+    carried, repaired = _injective(
+        carried, conformal, target.mesh.faces[:, order], target.boundary, target.holes, lambda: tell(0.95)
+    )
     return Bending(carried, offset, repaired)
 
 
@@ -478,7 +482,12 @@ def _conjugate_gradients(
 
 
 def _injective(
-    carried: Complexes, conformal: Complexes, faces: Integers, boundary: Integers, holes: tuple[Integers, ...]
+    carried: Complexes,
+    conformal: Complexes,
+    faces: Integers,
+    boundary: Integers,
+    holes: tuple[Integers, ...],
+    tell: Callable[[], None] = lambda: None,
 ) -> tuple[Complexes, int]:
     """Return the map with no triangle turned over or collapsed, and how many vertices were moved for it.
 
@@ -489,11 +498,11 @@ def _injective(
     ordered = carried.copy()
     ordered[boundary] = _in_order(carried[boundary], conformal[boundary])
     links = mean_value_weights(conformal, faces)
-    result = _interpolated(ordered, conformal, faces, links, boundary, holes)
+    result = _interpolated(ordered, conformal, faces, links, boundary, holes, tell)
     turned = _turned(result, faces)
     near = np.zeros(len(carried), bool)
     reach = 0.0
-    while turned.any():
+    while turned.any() and reach < 8:  # from 4 on nothing but the Möbius map is left
         near[faces[turned]] = True
         # steep enough fading would turn triangles over by itself
         reach = max(2 * reach, 4 * float(np.abs(ordered - conformal)[near].max()), 1e-3)
@@ -504,16 +513,10 @@ def _injective(
         share = np.clip(2 - 2 * distance / reach, 0, 1)
         for quarters in range(1, 5):
             faded = ordered - quarters / 4 * share * (ordered - conformal)
-            result = (
-                faded
-                if quarters == 4 and share[used].min() == 1
-                else _interpolated(faded, conformal, faces, links, boundary, holes)
-            )
+            result = _interpolated(faded, conformal, faces, links, boundary, holes, tell)
             turned = _turned(result, faces)
             if not turned.any():
                 break
-        if reach > 8:
-            break
     return result, int((np.abs(result - carried) > 0).sum())
 
 
@@ -524,6 +527,7 @@ def _interpolated(
     links: csr_array,
     boundary: Integers,
     holes: tuple[Integers, ...],
+    tell: Callable[[], None],
 ) -> Complexes:
     """Return the map with its displacement from the Möbius map interpolated across patches around turned triangles.
 
@@ -537,6 +541,7 @@ def _interpolated(
     inside[np.concatenate([boundary, *holes])] = False
     result, free = start, np.zeros(size, bool)
     for _ in range(REPAIR_ROUNDS):
+        tell()
         turned = _turned(result, faces)
         if not turned.any():
             break

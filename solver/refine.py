@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .flatten import Flattening
@@ -20,6 +22,7 @@ def refined(
     source_descriptors: Floats,
     target_descriptors: Floats,
     scale: float,
+    progress: Callable[[float], None] | None = None,
 ) -> Mobius:
     """Return the transformation near `mobius` at which the descriptors of all vertices agree best.
 
@@ -36,6 +39,8 @@ def refined(
         Standardised descriptors of the vertices.
     scale : float
         Standard deviation of the Gaussian.
+    progress : callable, optional
+        Called before each evaluation with a share of the work, in [0, 1]; may raise to end it.
     """
     used = np.flatnonzero(np.isfinite(source.disc.real))
     used = used[:: -(-len(used) // MOST_VERTICES)]
@@ -54,7 +59,7 @@ def refined(
 
     value, place, face, residual, term = agreement(mobius)
     damping = 1e-4
-    for _ in range(30):
+    for step_number in range(30):
         # the transformations next to the identity move x by a - conj(a) x^2 + i t x
         moves = np.stack([1 - place**2, 1j * (1 + place**2), 1j * place], axis=1)
         slope = slopes[face]
@@ -63,6 +68,8 @@ def refined(
         normal = np.einsum("qdp,qdr->pr", weighted, jacobian)
         force = np.einsum("qdp,qd->p", weighted, residual)
         while damping < 1e6:
+            if progress:
+                progress(step_number / 30)
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), force)
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
             trial = _small(step) @ mobius

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -30,7 +32,13 @@ def extrema(mesh: TriangleMesh, values: Floats, allowed: Booleans) -> Integers:
     return found[np.argsort(-np.abs(values[found]), kind="stable")]
 
 
-def farthest_points(mesh: TriangleMesh, count: int, first: Integers, allowed: Booleans) -> Integers:
+def farthest_points(
+    mesh: TriangleMesh,
+    count: int,
+    first: Integers,
+    allowed: Booleans,
+    progress: Callable[[float], None] | None = None,
+) -> Integers:
     """Return up to `count` vertices: those in `first`, then again and again the allowed one farthest from all before.
 
     Distances run along edges (Dijkstra), so that a bent surface gives the same points.
@@ -44,6 +52,8 @@ def farthest_points(mesh: TriangleMesh, count: int, first: Integers, allowed: Bo
         Where to begin; if empty, at the allowed vertex farthest from those not allowed.
     allowed : (n,) bool
         Vertices that may be chosen.
+    progress : callable, optional
+        Called with the share of the points chosen, in [0, 1]; may raise to end it.
     """
     graph = edge_graph(mesh)
     chosen = list(first[:count])
@@ -57,6 +67,8 @@ def farthest_points(mesh: TriangleMesh, count: int, first: Integers, allowed: Bo
         new = int(np.argmax(np.where(reachable, distance, -1)))
         if not reachable[new] or distance[new] <= 0:
             break
+        if progress:
+            progress(len(chosen) / count)
         chosen.append(new)
         distance = np.minimum(distance, dijkstra(graph, indices=new, limit=distance[new]))
     return np.array(chosen, dtype=np.intp)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,7 +67,7 @@ class SurfacePoints:
         Samples are the vertices and the faces' centres.
         """
         at, across, _, rim = self._samples
-        found = self._tree.query(np.hstack([points, self.normal_weight * normals]))[1]
+        found = self._tree.query(np.hstack([points, self.normal_weight * normals]), workers=-1)[1]
         return at[found], across[found], rim[found]
 
     def nearest_on_boundary(self, points: Floats) -> tuple[Floats, Floats]:
@@ -77,19 +78,25 @@ class SurfacePoints:
         ahead = ((points - at[found]) * tangent).sum(axis=1)
         return at[found] + ahead[:, None] * tangent, tangent
 
-    def nearest_point(self, points: Floats, normals: Floats, samples: int = 6) -> tuple[Integers, Floats]:
+    def nearest_point(
+        self, points: Floats, normals: Floats, samples: int = 6, progress: Callable[[float], None] | None = None
+    ) -> tuple[Integers, Floats]:
         """Return the face, (q,), and barycentric coordinates, (q, 3), of the nearest point of the surface.
 
         Looked for in the faces of the samples that suit each query best in position and normal, and next to them.
+        `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
         """
         _, _, face_of_sample, _ = self._samples
         count = min(samples, len(face_of_sample))
-        found = self._tree.query(np.hstack([points, self.normal_weight * normals]), k=count)[1]
+        found = self._tree.query(np.hstack([points, self.normal_weight * normals]), k=count, workers=-1)[1]
         near = face_of_sample[np.asarray(found).reshape(len(points), count)]
         around = face_neighbours(self.mesh.faces, len(self.mesh.vertices))[near[:, :2]].reshape(len(points), -1)
         face, best = near[:, 0].copy(), np.full(len(points), np.inf)
         barycentric = np.zeros((len(points), 3))
-        for column in np.concatenate([near, np.where(around < 0, near[:, :1], around)], axis=1).T:
+        candidates = np.concatenate([near, np.where(around < 0, near[:, :1], around)], axis=1).T
+        for k, column in enumerate(candidates):
+            if progress:
+                progress(k / len(candidates))
             corners = self.mesh.vertices[self.mesh.faces[column]]
             weights = nearest_in_triangle(points, corners)
             distance = ((np.einsum("qk,qkd->qd", weights, corners) - points) ** 2).sum(axis=1)
