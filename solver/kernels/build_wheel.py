@@ -72,6 +72,8 @@ def compile_library(target: Platform, processor: str, output: Path) -> None:
     command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-target", target.target, f"-mcpu={processor}"]
     if target.ending != "dll":
         command.append("-fPIC")
+    if target.ending == "dylib":
+        command.append(f"-Wl,-install_name,@rpath/{output.name}")  # else the folder it was compiled in
     done = subprocess.run([*command, str(HERE / "kernels.c"), "-o", str(output)], capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"compiling the kernels for {target.tag} failed:\n{done.stderr}")
