@@ -1,5 +1,6 @@
 """What is in the zips: the extension, the wheels of one platform, and nothing else."""
 
+import ast
 import hashlib
 import subprocess
 import tomllib
@@ -33,6 +34,26 @@ def test_the_zip_holds_the_extension_and_nothing_else(built: Path) -> None:
         names = [name for name in archive.namelist() if not name.endswith(".whl")]
     assert sorted(names) == sorted(sources() | {"__init__.py", "LICENSE", "blender_manifest.toml"})
     assert {Path(name).suffix for name in names} == {".py", ".c", ".toml", ""}
+
+
+def test_what_the_zip_imports_is_in_it(built: Path) -> None:
+    """Every relative import, wherever in a module it stands, leads to a file in the zip."""
+    with zipfile.ZipFile(built) as archive:
+        modules = {name.removesuffix(".py"): archive.read(name) for name in archive.namelist() if name.endswith(".py")}
+    known = {name.removesuffix("/__init__") for name in modules} | {"__init__"}
+    imports = 0
+    for name, code in modules.items():
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                parts = name.split("/")[: -node.level] + (node.module.split(".") if node.module else [])
+                imports += 1
+                if node.module:
+                    assert "/".join(parts) in known, f"{name}.py, line {node.lineno}"
+                elif parts != []:
+                    missing = [x.name for x in node.names if "/".join([*parts, x.name]) not in known]
+                    defined = modules.get("/".join([*parts, "__init__"]), b"").decode()
+                    assert all(x in defined for x in missing), f"{name}.py, line {node.lineno}"
+    assert imports > 100
 
 
 def test_the_zip_holds_scipy_for_both_pythons_and_the_kernels(built: Path) -> None:
