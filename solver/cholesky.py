@@ -26,8 +26,8 @@ except ImportError:  # the same to the last digits, and twice as slow
     threadpoolctl = None
 
 LARGE = 80_000
-"""Unknowns from which nested dissection is faster than SuperLU: at 48,000 it takes 1.3 times as long, at 194,000 a
-third (tests/bench/flatten.py)."""
+"""Unknowns from which nested dissection is faster than SuperLU: at 48,000 they take as long, at 194,000 it takes three
+quarters (docs/flattening.md)."""
 
 LEAF = 100
 """Parts of so many unknowns or fewer are eliminated as one dense block."""

@@ -12,7 +12,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, help="folder for tables and figures (default: paper/EXPERIMENT)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; each method runs on one core")
     parser.add_argument("--sizes", type=int, nargs="+", default=[100, 50, 20], help="numbers of points")
-    parser.add_argument("--trials", type=int, default=3, help="random instances of each synthetic setting")
+    parser.add_argument("--trials", type=int, default=1, help="random instances of each synthetic setting")
     options = parser.parse_args()
     # one core for each process: idle threads of the linear algebra would spin on the others'
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"

@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.collections import LineCollection, PolyCollection
+from PIL import Image
 
 from solver import Flattening, Mobius, TriangleMesh
 from solver.search import SearchResult
@@ -183,3 +184,4 @@ def _shaded(axes: Any, mesh: TriangleMesh, view: np.ndarray) -> None:
 def _save(figure: Any, path: Path) -> None:
     figure.savefig(path)
     plt.close(figure)
+    Image.open(path).convert("RGB").quantize(192).save(path, optimize=True)  # a third of the size

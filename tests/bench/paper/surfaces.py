@@ -116,7 +116,6 @@ def beside(pair: Pair) -> list[dict[str, Any]]:
             "method": "solver.align",
             "certified": found.search.certified,
             "Q_truth": q_truth(found.mobius, a, b),
-            "seconds": round(sum(found.seconds.values()), 3),
         },
     ]
 
