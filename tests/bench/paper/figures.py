@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from PIL import Image
 
 from solver import Flattening, Mobius, TriangleMesh
+from solver.mobius import hyperbolic_distance
 from solver.search import SearchResult
 
 from . import quoted
@@ -74,7 +75,8 @@ def on_silhouette(
     vertex = np.array([int(np.argmin(np.abs(flat.disc - x))) for x in problem.source])
     image, expected = found.mobius(problem.source), planted(problem.source)
     # right: the target point lies where the planted transformation, within noise, puts the source point
-    near = {int(j): abs(problem.target[k] - expected[j]) < 5 * problem.radius for j, k in found.matches}
+    off = hyperbolic_distance(problem.target[found.matches[:, 1]], expected[found.matches[:, 0]])
+    near = dict(zip(found.matches[:, 0].tolist(), off < 5 * problem.radius, strict=True))
     colours = [POINT if j not in near else RIGHT if near[j] and j in good else WRONG for j in range(len(image))]
     axes[0].triplot(*flat.mesh.vertices[:, :2].T, flat.mesh.faces, linewidth=0.2, color="#b9bec6")
     axes[0].scatter(*flat.mesh.vertices[vertex, :2].T, s=14, c=colours, zorder=3)
