@@ -110,6 +110,8 @@ def _take_streams() -> None:
 
 def _parser(prog: str) -> argparse.ArgumentParser:
     parser = _Parser(prog=prog, description="Certified conformal correspondence between two surfaces, and transfer.")
+    if prog == "python .":
+        parser.epilog = "'python . build' makes the extension's zips, from the sources only."
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=_Parser)
     mesh_help = "any file Blender imports (.blend .obj .ply .stl .glb .gltf .fbx .usd); FILE:OBJECT names an object"
 

@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import subprocess
+import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -121,6 +122,12 @@ def test_an_unknown_platform_is_wrong_usage(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert f"unknown platform amiga: take {', '.join(PLATFORMS)}" in done.stderr
     assert not (tmp_path / "dist").exists()
+
+
+def test_the_help_names_the_build() -> None:
+    done = subprocess.run([sys.executable, str(ROOT), "--help"], capture_output=True, text=True, check=False)
+    assert "'python . build' makes the extension's zips" in done.stdout
+    assert "--output" in run_build("--help").stdout
 
 
 def test_a_wheel_that_is_not_pinned_is_refused() -> None:
