@@ -107,7 +107,7 @@ def steps() -> Wait:
     yield 0.5
 
     # another file in the middle of the work
-    bpy.ops.mobius.align("INVOKE_DEFAULT")
+    bpy.ops.mobius.align("INVOKE_DEFAULT", samples=99)  # what was asked before is known
     yield from until(lambda: stage_now() == "Searching")
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield 1.0
