@@ -34,7 +34,7 @@ SHARES = 8
 
 FRONTIER = 1 << 18
 """Open cells, 64 bytes each, beyond which the smallest are searched first: then the search is depth first, and adds
-few more."""
+few more: those that one round leaves."""
 
 NEAR = 1 / 16
 """Turns that rotations near a good one spread over."""
@@ -145,6 +145,12 @@ def search(
     ------
     ValueError
         Wrong shapes or values out of range; the text names which.
+
+    Notes
+    -----
+    Memory: some `FRONTIER` open cells of 64 bytes are kept, 16 MB. When there are more, the smallest are taken on instead
+    of the best, depth first, until there are fewer. On top come 8 MB per thread for lists of pairs, and a raster of the
+    target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB.
 
     Examples
     --------

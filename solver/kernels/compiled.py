@@ -172,6 +172,7 @@ class CompiledKernels:
         """Return the address of this thread's working memory."""
         if not hasattr(self._local, "memory"):
             self._local.memory = np.empty(self._library.mobius_work_bytes(self.points, ARENA), np.uint8)
+            self._local.left = new_nodes(2 * STACK)
         return self._local.memory.ctypes.data
 
     def images(self, z: complex, half: float, kappa: complex) -> tuple[Floats, Floats, Floats, Floats]:
@@ -224,7 +225,7 @@ class CompiledKernels:
         counts = np.zeros(4, np.int64)
         parts, spent = [], 0
         while len(given):
-            room = new_nodes(2 * STACK)
+            work, room = self._work(), self._local.left
             done = self._library.mobius_expand(
                 ctypes.addressof(self._problem),
                 given.ctypes.data,
@@ -234,11 +235,11 @@ class CompiledKernels:
                 room.ctypes.data,
                 len(room),
                 counts.ctypes.data,
-                self._work(),
+                work,
                 ARENA,
             )
             given = np.ascontiguousarray(given[done:])
-            parts.append(room[: counts[0]])
+            parts.append(room[: counts[0]].copy())
             spent += int(counts[1])
         left = np.concatenate(parts) if parts else new_nodes(0)
         left[:, BOUND] *= self.unit
