@@ -148,9 +148,9 @@ def search(
 
     Notes
     -----
-    Memory: some `FRONTIER` open cells of 64 bytes are kept, 16 MB. When there are more, the smallest are taken on instead
-    of the best, depth first, until there are fewer. On top come 8 MB per thread for lists of pairs, and a raster of the
-    target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB.
+    Memory: some `FRONTIER` open cells of 64 bytes are kept, 16 MB. When there are more, the smallest are taken on
+    instead of the best, depth first, until there are fewer. On top come 8 MB per thread for lists of pairs, and a
+    raster of the target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB.
 
     Examples
     --------

@@ -139,8 +139,8 @@ def limit(label: str, given: tuple[np.ndarray, np.ndarray], radius: float, z_max
     compiled.library = fast
     needed, nanoseconds = leaves(problem, found.value, z_max), 1e9 * spent / found.nodes / len(given[0])
     print(
-        f"{label}: about {needed:.0f} leaves needed, {found.nodes} bounds computed; a bound takes {nanoseconds:.0f} ns per "
-        f"source point; {slow / spent:.2f} times that without AVX2",
+        f"{label}: about {needed:.0f} leaves needed, {found.nodes} bounds computed; a bound takes "
+        f"{nanoseconds:.0f} ns per source point; {slow / spent:.2f} times that without AVX2",
         flush=True,
     )
 
