@@ -171,6 +171,38 @@ def test_a_full_frontier_is_searched_depth_first(monkeypatch):
     assert held.value == free.value
 
 
+@pytest.mark.parametrize("smallest", [2.0**-4, 2.0**-7, 2.0**-9])
+def test_what_cells_too_small_to_split_leave_open_is_reported_as_a_gap(monkeypatch, smallest):
+    rng = np.random.default_rng(11)
+    source, target = planted(rng, random_mobius(rng, 0.5), 40, 0.4, 0.01)
+    optimum = search(source, target, 0.02, z_max=0.8)
+    assert optimum.certified
+    monkeypatch.setattr(sys.modules["solver.search"], "SMALLEST_CELL", smallest)
+    coarse = search(source, target, 0.02, z_max=0.8)
+    assert coarse.value <= optimum.value <= coarse.upper_bound
+    assert not coarse.certified
+    # what is left is what the undecided cells may hold, not what was never looked at
+    assert coarse.upper_bound < len(source)
+    assert coarse.value == matching(source, target, 0.02).value(coarse.mobius)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_compatible_pairs_alone_count(seed):
+    """Weights of 0 and 1, weights of 1 and less, and one raster for all: the same optimum where they say the same."""
+    rng = np.random.default_rng(seed)
+    source, target = planted(rng, random_mobius(rng, 0.5), 30, 0.4, 0.01)
+    far = np.append(target, 0.99j)  # compatible with nothing: so every source point gets a row of its own
+    allowed = np.ones((30, 31))
+    allowed[:, 30] = 0
+    shared = search(source, target, 0.03, z_max=0.8)
+    own = search(source, far, 0.03, weights=allowed, z_max=0.8)
+    halved = search(source, far, 0.03, weights=allowed / 2, z_max=0.8)
+    assert shared.certified
+    assert own.certified
+    assert halved.certified
+    assert shared.value == own.value == 2 * halved.value
+
+
 def test_one_to_one_counts_no_target_twice():
     target = np.array([0.3, -0.5])
     many = search([0.3, 0.3001, 0.2999, -0.5], target, 0.05, z_max=0.3)
