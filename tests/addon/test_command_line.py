@@ -160,13 +160,16 @@ def test_align_without_outputs_says_what_it_found(scans: Path, capsys: pytest.Ca
 
 def test_transfer_carries_everything_into_a_blend(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out_file = scans / "out.blend"
+    # Blender 4.2 imports a file without normals as flat, which the source is too; later ones as smooth
+    smooth = any(polygon.use_smooth for polygon in files.import_mesh(str(scans / "target.obj")).obj.data.polygons)
     arguments = ["-o", out_file, "--report", scans / "r.json", "--map", scans / "m.npz", *QUICK]
     status, out, err = run(capsys, "transfer", scans / "source.blend", scans / "target.obj", *arguments)
     assert (status, err) == (0, "")
-    assert f"{out_file}: 1 vertex group, 1 UV map, 1 smooth flag from {scans / 'source.blend'}" in out
+    carried = "1 vertex group, 1 UV map" + (", 1 smooth flag" if smooth else "")
+    assert f"{out_file}: {carried} from {scans / 'source.blend'}" in out
     assert json.loads((scans / "r.json").read_text())["transferred"] == [
         {"kind": "vertex-groups", "source": "Right", "target": "Right"},
-        {"kind": "smoothness", "source": "sharp_face", "target": "sharp_face"},
+        *([{"kind": "smoothness", "source": "sharp_face", "target": "sharp_face"}] if smooth else []),
         {"kind": "uv", "source": "UVMap", "target": "UVMap"},
     ]
     bpy.ops.wm.open_mainfile(filepath=str(out_file))
