@@ -1,6 +1,6 @@
 """The extension's zips, one per platform: our files, scipy's wheels and the compiled kernels as a wheel of our own.
 
-`blender_manifest.toml` names the wheels; `wheels.sha256` says what each of scipy's has to be. pip fetches those,
+`blender_manifest.toml` names the wheels; `wheels.sha256` says what each that is not ours has to be. pip fetches those,
 `solver/kernels/build_wheel.py` compiles ours, and the builder of Blender's own extension system, from the Python module
 `bpy`, packs and validates: no Blender has to run.
 """
@@ -118,7 +118,7 @@ def runs_on(wheel: str, platform: str) -> bool:
     system, processor = platform.split("-")
     start = {"windows": "win_", "macos": "macosx_", "linux": "manylinux"}[system]
     ends = {"x64": ("x86_64", "amd64"), "arm64": ("arm64", "aarch64")}[processor]
-    return any(tag.startswith(start) and tag.endswith(ends) for tag in platform_tags(wheel))
+    return any(tag == "any" or (tag.startswith(start) and tag.endswith(ends)) for tag in platform_tags(wheel))
 
 
 def platform_tags(wheel: str) -> list[str]:
@@ -151,9 +151,11 @@ def fetch(wheel: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         requirement = Path(folder, "requirement.txt")
         requirement.write_text(f"{project}=={version} --hash=sha256:{pinned(wheel)}\n", encoding="utf-8")
-        options = ["--python-version", f"{python[2]}.{python[3:]}", "--implementation", python[:2], "--abi", abi]
-        for tag in platform_tags(wheel):
-            options += ["--platform", tag]
+        options: list[str] = []
+        if platform_tags(wheel) != ["any"]:
+            options += ["--python-version", f"{python[2]}.{python[3:]}", "--implementation", python[:2], "--abi", abi]
+            for tag in platform_tags(wheel):
+                options += ["--platform", tag]
         run(
             sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
             "--only-binary=:all:", "--require-hashes", *options, "--dest", folder, "-r", requirement,

@@ -61,9 +61,10 @@ def test_the_zip_holds_scipy_for_both_pythons_and_the_kernels(built: Path) -> No
     named = {wheel.removeprefix("./") for wheel in MANIFEST["wheels"]}
     wheels = wheels_in(built)
     assert wheels <= named
-    assert {Path(wheel).name.split("-")[0] for wheel in wheels} == {"mobius_kernels", "scipy"}
-    assert {"cp311", "cp313", "py3"} <= {wheel.split("-")[2] for wheel in wheels}
-    assert len(wheels) == len({wheel.split("-")[2] for wheel in wheels})
+    kinds = {(Path(wheel).name.split("-")[0], wheel.split("-")[2]) for wheel in wheels}
+    assert {project for project, _ in kinds} == {"mobius_kernels", "scipy", "threadpoolctl"}
+    assert {"cp311", "cp313", "py3"} == {python for _, python in kinds} - {"cp314"}
+    assert len(wheels) == len(kinds)
 
 
 def test_the_scipy_in_the_zip_is_the_pinned_one(built: Path) -> None:
@@ -78,7 +79,7 @@ def test_every_wheel_of_the_manifest_is_pinned_or_ours_and_none_is_numpy() -> No
     pinned = {line.split()[1] for line in (ROOT / "release/wheels.sha256").read_text().splitlines()}
     named = {Path(wheel).name for wheel in MANIFEST["wheels"]}
     assert {name for name in named if not name.startswith("mobius_kernels-")} == pinned
-    assert {name.split("-")[0] for name in named} == {"mobius_kernels", "scipy"}
+    assert {name.split("-")[0] for name in named} == {"mobius_kernels", "scipy", "threadpoolctl"}
 
 
 @pytest.mark.parametrize("platform", PLATFORMS)
@@ -88,7 +89,7 @@ def test_every_platform_has_its_kernels_and_scipy(platform: str) -> None:
     kinds = {(name.split("-")[0], name.split("-")[2]) for name in mine}
     # Blender for Intel Macs ended with Python 3.11; Linux distributions build theirs for 3.14
     pythons = {"macos-x64": ["cp311"], "linux-x64": ["cp311", "cp313", "cp314"]}.get(platform, ["cp311", "cp313"])
-    assert kinds == {("mobius_kernels", "py3")} | {("scipy", python) for python in pythons}
+    assert kinds == {("mobius_kernels", "py3"), ("threadpoolctl", "py3")} | {("scipy", python) for python in pythons}
     assert len(mine) == len(kinds)
 
 

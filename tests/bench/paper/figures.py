@@ -137,7 +137,8 @@ def on_surfaces(
     axes[1].scatter(marks[1].real, marks[1].imag, s=40, facecolors="none", edgecolors="black", linewidths=0.8)
     axes[1].scatter(image.real, image.imag, s=10, c=RIGHT)
     proved = "proved optimal" if found.certified else f"upper bound {found.upper_bound:.0f}"
-    figure.text(0.5, 0.06, f"{found.value:.0f} of {len(problem.source)} matched, {proved}", ha="center")
+    text = f"{found.value:.0f} of {len(problem.source)} matched ({found.one_to_one:.0f} one to one), {proved}"
+    figure.text(0.5, 0.06, text, ha="center")
     _save(figure, path)
 
 

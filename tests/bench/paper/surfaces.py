@@ -154,11 +154,11 @@ def run(name: str, pairs: list[Pair], note: str, folder: Path, sizes: list[int],
     ]
     (folder / f"{name}.txt").write_text("\n".join(text), encoding="utf-8")
     print("\n".join(text[:4]))
-    for objective, end in ((INVARIANT, "correspondences"), (PRINTED, "as_printed")):
-        pair = pairs[0]
+    drawn = [(pair, INVARIANT, "correspondences") for pair in pairs] + [(pairs[0], PRINTED, "as_printed")]
+    for pair, objective, end in drawn:
         problem = pair.problem(objective, max(sizes))
         figures.on_surfaces(
-            folder / f"{name}_{end}.png",
+            folder / f"{name}_{end}_{pair.name.replace(' ', '_')}.png",
             f"{pair.name}, {objective}",
             (pair.source.mesh, pair.target.mesh),
             (pair.source.samples, pair.target.samples),
