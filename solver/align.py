@@ -372,16 +372,18 @@ def _bent(found: Alignment, clock: _Part, landmarks: npt.ArrayLike | None) -> Al
         found.target_descriptors,
         found.settings.descriptor_scale,
     )
-    draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.2))
-    here, there = shared(draft, source, target)
+    draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.15))
+    here, there = shared(draft, source, target, clock.within(0.15, 0.2))
     overlap = None
     if max(_left_out(source, target, here, there)) > PARTIAL:
         clock.begin("overlap", "Finding the overlap", 0.2)
+        still = clock.within(0.2, 0.2)
         for _ in range(DRAFTS - 1):
             # pose and scale again, from where the surfaces meet
-            draft = drafted(found.mobius, source, target, np.where(there, 1.0, 1e-3), draft.places(target), ROUNDS)
+            believed = np.where(there, 1.0, 1e-3)
+            draft = drafted(found.mobius, source, target, believed, draft.places(target), ROUNDS, still)
             before = here, there
-            here, there = shared(draft, source, target)
+            here, there = shared(draft, source, target, still)
             if max(_left_out(source, target, here == before[0], there == before[1])) < SETTLED:
                 break
         if max(_left_out(source, target, here, there)) > PARTIAL:
@@ -457,7 +459,7 @@ def _overlap(
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
     start = scale * (places[target_part.vertices] - middle)
     again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
-    _, there = shared(again, inner.source, inner.target)
+    _, there = shared(again, inner.source, inner.target, clock.within(0.6, 0.6))
     bending = finished(
         again,
         inner.source,

@@ -179,12 +179,15 @@ def drafted(
     mirror, order = ([-1, 1, 1], [0, 2, 1]) if mobius.reflected else ([1, 1, 1], [0, 1, 2])
     whole = TriangleMesh(target.mesh.vertices * mirror, target.mesh.faces[:, order])
 
+    tell(0.0)
     nodes, faces = _coarse(target, NODES, order)
+    tell(0.0)
     places = _positions(conformal[nodes], source, onto) if start is None else start[nodes]
     believed = np.ones(len(nodes)) if trust is None else trust[nodes]
     unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(unbent[nodes], faces)
     rest = _turned_like(flat, places, believed, BEND_LENGTH if start is None else NEAR_BEND_LENGTH)
+    tell(0.0)
     rest = _in_pose(TriangleMesh(rest, faces), onto)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = _relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
@@ -224,11 +227,14 @@ def finished(
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:]
     now = _relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[nodes], lambda share: tell(0.5 * share))
 
+    tell(0.5)
     fine, fine_faces = _coarse(target, FINE_NODES, order)
+    tell(0.5)
     followed = _following(nodes, flat, now, target.disc, unbent, fine)
     start = _following(nodes, flat, draft.rest, target.disc, unbent, fine)
     lengths = _lengths(FINE_STIFFNESS, SOFTEST, FINE_ROUNDS)
     settled = _relaxed(start, followed, fine_faces, onto, lengths, drawn[fine], lambda share: tell(0.5 + 0.3 * share))
+    tell(0.8)
     all_places = np.zeros_like(unbent)
     all_places[used] = _following(fine, TriangleMesh(unbent[fine], fine_faces), settled, target.disc, unbent, used)
     all_places[fine] = settled

@@ -6,6 +6,7 @@ towards the cuts. A bent draft shows what of either surface lies beyond the othe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,21 +22,28 @@ BEYOND = 0.01
 """How far past the other's boundary, in roots of the source's area, a point has no counterpart: what drafts err by."""
 
 
-def shared(draft: Draft, source: Flattening, target: Flattening) -> tuple[Booleans, Booleans]:
-    """Return which source vertices, (n_source,), and target vertices, (n_target,), have a counterpart in the other."""
+def shared(
+    draft: Draft, source: Flattening, target: Flattening, progress: Callable[[float], None] | None = None
+) -> tuple[Booleans, Booleans]:
+    """Return which source vertices, (n_source,), and target vertices, (n_target,), have a counterpart in the other.
+
+    `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
+    """
+    tell = progress or (lambda _: None)
     places = draft.places(target)
     bent = TriangleMesh(places, draft.whole.faces)
     onto = draft.onto
     back = SurfacePoints(bent, (target.boundary, *target.holes), onto.normal_weight)
-    return ~_left_over(onto.mesh, back), ~_left_over(bent, onto)
+    here = ~_left_over(onto.mesh, back, lambda share: tell(share / 2))
+    return here, ~_left_over(bent, onto, lambda share: tell((1 + share) / 2))
 
 
-def _left_over(mesh: TriangleMesh, surface: SurfacePoints) -> Booleans:
+def _left_over(mesh: TriangleMesh, surface: SurfacePoints, progress: Callable[[float], None]) -> Booleans:
     """Return which vertices of the mesh, (n,), lie more than `BEYOND` past a boundary of the surface.
 
     A strip all of which lies within `RIM_REACH` is not left over: boundaries so near each other are the same one.
     """
-    depth = depth_beyond(mesh.vertices, mesh.vertex_normals(), surface)
+    depth = depth_beyond(mesh.vertices, mesh.vertex_normals(), surface, progress)
     past = depth > BEYOND
     i, j = mesh.edges[past[mesh.edges].all(axis=1)].T
     count = len(depth)
@@ -45,10 +53,12 @@ def _left_over(mesh: TriangleMesh, surface: SurfacePoints) -> Booleans:
     return past & (deepest[label] > RIM_REACH)
 
 
-def depth_beyond(points: Floats, normals: Floats, surface: SurfacePoints) -> Floats:
+def depth_beyond(
+    points: Floats, normals: Floats, surface: SurfacePoints, progress: Callable[[float], None] | None = None
+) -> Floats:
     """Return how far each point, (q,), lies past a boundary of the surface, measured along it; 0 over the surface."""
     faces, vertices = surface.mesh.faces, surface.mesh.vertices
-    face, barycentric = surface.nearest_point(points, normals)
+    face, barycentric = surface.nearest_point(points, normals, progress=progress)
     on_rim = np.zeros(len(vertices), bool)
     on_rim[np.concatenate(surface.loops)] = True
     edge = np.flatnonzero((on_rim[faces[face]] | (barycentric < 1e-9)).all(axis=1))

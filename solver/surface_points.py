@@ -99,7 +99,8 @@ class SurfacePoints:
                 progress(k / len(candidates))
             corners = self.mesh.vertices[self.mesh.faces[column]]
             weights = nearest_in_triangle(points, corners)
-            distance = ((np.einsum("qk,qkd->qd", weights, corners) - points) ** 2).sum(axis=1)
+            apart = np.einsum("qk,qkd->qd", weights, corners) - points
+            distance = _dot(apart, apart)
             nearer = distance < best
             face[nearer], best[nearer], barycentric[nearer] = column[nearer], distance[nearer], weights[nearer]
         return face, barycentric
@@ -108,23 +109,29 @@ class SurfacePoints:
 def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:
     """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, 3), nearest to a point, (q, 3)."""
     b, c, p = (x - corners[:, 0] for x in (corners[:, 1], corners[:, 2], points))
-    bb, bc, cc = (b * b).sum(axis=1), (b * c).sum(axis=1), (c * c).sum(axis=1)
-    pb, pc = (p * b).sum(axis=1), (p * c).sum(axis=1)
+    bb, bc, cc, pb, pc = _dot(b, b), _dot(b, c), _dot(c, c), _dot(p, b), _dot(p, c)
     square = bb * cc - bc**2
     square = np.where(square > 0, square, np.inf)
     v, w = (cc * pb - bc * pc) / square, (bb * pc - bc * pb) / square
     weights = np.stack([1 - v - w, v, w], axis=1)
-    outside = np.flatnonzero((weights < 0).any(axis=1) | ~np.isfinite(square))
+    outside = np.flatnonzero((weights[:, 0] < 0) | (v < 0) | (w < 0) | ~np.isfinite(square))
+    points, corners = points[outside], corners[outside]
     best = np.full(len(outside), np.inf)
+    nearest = np.zeros((len(outside), 3))
     for k in range(3):  # the nearest point of each side
-        start = corners[outside, k]
-        side = corners[outside, (k + 1) % 3] - start
-        length = np.maximum((side**2).sum(axis=1), np.finfo(float).tiny)
-        along = np.clip(((points[outside] - start) * side).sum(axis=1) / length, 0, 1)
-        distance = ((start + along[:, None] * side - points[outside]) ** 2).sum(axis=1)
+        start = corners[:, k]
+        side = corners[:, (k + 1) % 3] - start
+        length = np.maximum(_dot(side, side), np.finfo(float).tiny)
+        along = np.clip(_dot(points - start, side) / length, 0, 1)
+        apart = start + along[:, None] * side - points
+        distance = _dot(apart, apart)
         nearer = distance < best
         best[nearer] = distance[nearer]
-        row = np.zeros((len(outside), 3))
-        row[:, k], row[:, (k + 1) % 3] = 1 - along, along
-        weights[outside[nearer]] = row[nearer]
+        nearest[nearer, k], nearest[nearer, (k + 1) % 3], nearest[nearer, k - 1] = 1 - along[nearer], along[nearer], 0
+    weights[outside] = nearest
     return weights
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Return the dot product of each row, (n,), of two (n, 3)."""
+    return np.einsum("ij,ij->i", a, b)
