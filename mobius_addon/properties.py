@@ -68,7 +68,7 @@ class MobiusView(bpy.types.PropertyGroup):
         update=_show_or_hide,
     )
     lines: bpy.props.FloatProperty(
-        name="Lines",
+        name="Opacity",
         description="How opaque the lines between matched points are; 0: only the points are drawn",
         default=0.5,
         min=0.0,
