@@ -14,6 +14,7 @@ from ...solver import Correspondence
 from ...solver.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.interpolate import (
     CornerInterpolation,
+    edges_in_reach,
     local_similarities,
     source_of_corners,
     source_of_edges,
@@ -121,8 +122,16 @@ class Carrier:
 
         Edges in a gap have none: a line that is nearest there would be drawn all over it.
         """
-        origin = self._edge_origin
-        return values[origin], origin >= 0
+        covered = (self.correspondence.face[self.target.edges] >= 0).all(axis=1) & (len(values) > 0)
+        marked = values.reshape(len(values), -1).astype(bool).any(axis=1)
+        if values.dtype == object or marked.mean() > 0.3:
+            return values[self._edge_origin], covered
+        # few edges are marked, as seams are: look closer only beside these
+        found, places, edges = self.correspondence, self.source.mesh.vertices, self.source.edges
+        near = np.flatnonzero(edges_in_reach(found, places, edges, marked, self.target.edges))
+        result = np.zeros((len(covered), *values.shape[1:]), values.dtype)
+        result[near] = values[source_of_edges(found, places, edges, self.target.edges[near])]
+        return result, covered
 
     def displacements(self, values: Values) -> tuple[Values, Booleans]:
         """Carry vectors per vertex, (n_source, 3), turned and scaled with the surface; returns as `points`."""

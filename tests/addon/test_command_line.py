@@ -200,6 +200,39 @@ def test_transfer_says_what_a_format_cannot_hold(scans: Path, capsys: pytest.Cap
     assert err == "mobius: warning: .obj files cannot hold vertex groups: write a .blend to keep them\n"
 
 
+def test_every_choice_of_a_transfer_is_a_flag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, target = make_sheet("Source", 16), make_sheet("Target", 14)
+    for obj, weight in ((source, 0.5), (target, 0.25)):
+        for name in ("Head", "Head 2", "Neck"):
+            obj.vertex_groups.new(name=name).add(range(len(obj.data.vertices)), weight, "REPLACE")
+    right = [v.index for v in target.data.vertices if v.co.x > 0]
+    target.vertex_groups.new(name="Right").add(right, 1.0, "REPLACE")
+    path = tmp_path / "two.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    status, out, err = run(
+        capsys, "transfer", f"{path}:Source", f"{path}:Target", "-o", tmp_path / "out.blend", "--report",
+        tmp_path / "r.json", "--only", "vertex-groups", "--names", "Head*", "--mix", "add", "--mix-factor", "0.5",
+        "--target-mask", "Right", "--invert-target-mask", "--unmatched", "fill", "--smallest-weight", "0.01",
+        "--limit", "4", "--evaluated", *QUICK,
+    )  # fmt: skip
+    assert status == 0, err
+    assert "2 vertex groups from" in out
+    assert set(json.loads((tmp_path / "r.json").read_text())["unmatched"]) == {"vertices", "area", "outcome", "bare"}
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    obj = bpy.data.objects["Target"]
+    expected = np.where(np.isin(np.arange(len(obj.data.vertices)), right), 0.25, 0.5)
+    for name in ("Head", "Head 2"):
+        assert weights(obj, name) == pytest.approx(expected, abs=1e-5)
+    assert weights(obj, "Neck") == pytest.approx(0.25)
+    status, _, err = run(
+        capsys, "transfer", f"{path}:Source", f"{path}:Target", "-o", tmp_path / "both.blend",
+        "--only", "vertex-groups", "--collisions", "number", "--active", "--normalize", *QUICK,
+    )  # fmt: skip
+    assert status == 0, err
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "both.blend"))
+    assert len(bpy.data.objects["Target"].vertex_groups) == 5
+
+
 def test_two_objects_of_one_blend(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     make_sheet("Scan", 16).vertex_groups.new(name="Head").add(range(256), 0.5, "REPLACE")
     make_sheet("Scan.001", 14)
@@ -236,6 +269,18 @@ def test_two_objects_of_one_blend(tmp_path: Path, capsys: pytest.CaptureFixture[
         (2, ["flatten", "target.obj", "-o", "out.xyz"], "'out.xyz' has an ending that is not known"),
         (2, ["flatten", "target.obj", "-o", "folder"], "'folder' has an ending that is not known"),
         (2, ["transfer", "source.obj", "target.obj", "-o", "o.obj", "--only", "hats"], "--only does not know 'hats'"),
+        (2, ["transfer", "source.obj", "target.obj", "-o", "o.obj", "--mix-factor", "2"], "the mix factor lies from 0"),
+        (2, ["transfer", "source.obj", "target.obj", "-o", "o.obj", "--limit", "-1"], "the limit of groups per vertex"),
+        (
+            2,
+            ["transfer", "source.obj", "target.obj", "-o", "o.obj", "--invert-source-mask"],
+            "--invert-source-mask inverts --source-mask: give both",
+        ),
+        (
+            1,
+            ["transfer", "source.blend", "target.obj", "-o", "o.blend", "--source-mask", "Hat", *QUICK],
+            "has no vertex group and no attribute of single numbers named 'Hat' for its mask",
+        ),
         (
             2,
             ["transfer", "source.obj", "target.obj", "-o", "o.obj", "--use-map", "no.npz"],

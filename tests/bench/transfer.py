@@ -136,7 +136,7 @@ def accuracy() -> tuple[list[Outcome], dict[str, TriangleMesh]]:
         methods: dict[str, tuple[Callable[[Any, Any], None], TriangleMesh]] = {"Data Transfer": (data_transfer, lying)}
         if whole is not neutral:
             best = TriangleMesh(fitted(lying.vertices, place), lying.faces)
-            methods["Data Transfer, best pose given"] = (data_transfer, best)
+            methods["Data Transfer, best pose"] = (data_transfer, best)
         methods["Möbius"] = (ours, lying)
         for name, (method, mesh) in methods.items():
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -177,7 +177,7 @@ def picture(path: Path, outcomes: list[Outcome], targets: dict[str, TriangleMesh
     from matplotlib.collections import PolyCollection
 
     worst = 30.0
-    figure, axes = plt.subplots(1, len(outcomes), figsize=(2.3 * len(outcomes), 3.1), layout="constrained")
+    figure, axes = plt.subplots(1, len(outcomes), figsize=(2.3 * len(outcomes), 3.5), layout="constrained")
     for ax, outcome in zip(axes, outcomes, strict=True):
         mesh = targets[outcome.case]
         corners = mesh.vertices[mesh.faces]
@@ -192,8 +192,7 @@ def picture(path: Path, outcomes: list[Outcome], targets: dict[str, TriangleMesh
         ax.autoscale()
         ax.set_aspect("equal")
         ax.axis("off")
-        name = outcome.method.replace(", ", ",\n")
-        ax.set_title(f"{outcome.case}\n{name}\nmean {100 * outcome.weights.mean():.2f} %", fontsize=8)
+        ax.set_title(f"{outcome.case}\n{outcome.method}\nmean {100 * outcome.weights.mean():.2f} %", fontsize=8)
     scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, worst), "YlOrRd")
     figure.colorbar(scale, ax=axes, shrink=0.6, label="weight at the wrong group, %", extend="max")
     figure.savefig(path, dpi=110)

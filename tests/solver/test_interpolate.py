@@ -3,7 +3,15 @@ import pytest
 from surfaces import planar, rings
 
 from solver import Correspondence, TriangleMesh, interpolate, interpolate_corners
-from solver.interpolate import local_similarities, source_of_corners, source_of_edges, source_of_faces, value_islands
+from solver.interpolate import (
+    edges_in_reach,
+    local_similarities,
+    nearest_orthogonal,
+    source_of_corners,
+    source_of_edges,
+    source_of_faces,
+    value_islands,
+)
 from solver.locate import TriangulatedDisc
 
 
@@ -234,3 +242,36 @@ def test_the_local_similarity_of_a_similar_surface_is_the_similarity(mirror):
     rotation, scale = local_similarities(on_itself(source, 0), source, target)
     assert np.abs(rotation - turn).max() < 1e-9
     assert scale == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("sizes", [(41, 30), (14, 30), (30, 7)])
+def test_no_edge_out_of_reach_comes_from_a_marked_one(sizes):
+    rng = np.random.default_rng(0)
+    source, target = sheet(sizes[0])[0], sheet(sizes[1], sizes[1] + 2)[0]
+    edges = [m.edges for m in (source, target)]
+    marked = rng.random(len(edges[0])) < 0.01
+    found = planar_correspondence(source, target)
+    origin = source_of_edges(found, source.vertices, *edges)
+    near = edges_in_reach(found, source.vertices, edges[0], marked, edges[1])
+    assert not marked[origin[~near]].any()
+    if sizes[0] > 20 and sizes[1] > 20:
+        assert near.mean() < 0.9
+    assert not edges_in_reach(found, source.vertices, edges[0], 0 * marked > 0, edges[1]).any()
+
+
+@pytest.mark.parametrize("kind", [1, -1])
+def test_nearest_orthogonal_matrices_are_those_of_the_singular_values(kind):
+    rng = np.random.default_rng(1)
+    matrices = rng.normal(size=(400, 3, 3))
+    handed = np.sign(np.linalg.det(matrices))
+    matrices[(handed != kind) & (np.arange(400) > 40), 0] *= -1  # most are of the kind, a tenth is not
+    matrices[:3] = np.outer([1, 2, 3], [1, 0, -1])  # of rank one
+    matrices[3:6, 2] = matrices[3:6, 1]  # of rank two
+    left, _, right = np.linalg.svd(matrices)
+    left[np.sign(np.linalg.det(left @ right)) != kind, :, 2] *= -1
+    found = nearest_orthogonal(matrices)
+    assert np.sign(np.linalg.det(found)) == pytest.approx(kind)
+    assert np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max() < 1e-12
+    # that of rank one is not determined; the others are the best there are
+    assert np.abs(found - left @ right)[3:].max() < 1e-9
+    assert (nearest_orthogonal(np.eye(3)[None]) == np.eye(3)).all()
