@@ -176,7 +176,9 @@ def on_source(alignment: solver.Alignment, correspondence: solver.Correspondence
 def summary(source: str, target: str, alignment: solver.Alignment, correspondence: solver.Correspondence) -> str:
     """Return one sentence about an alignment: what matched, and what is proved about it."""
     mirrored = ", mirrored" if alignment.mobius.reflected else ""
-    margin = "" if alignment.margin is None else f", {alignment.margin:.0%} ahead of the other orientation"
+    margin = ""
+    if (ahead := alignment.margin) is not None:
+        margin = f", {abs(ahead):.1%} {'ahead of' if ahead >= 0 else 'behind'} the other orientation"
     share = ""
     if (overlap := alignment.overlap) is not None:
         proven = _proof(overlap.alignment)
