@@ -282,7 +282,8 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
     if (margin := found["orientation_margin"]) is not None:
         rows.append((iface_("Not Mirrored") if reflected else iface_("Mirrored"), _behind(margin)))
     if (margin := found["rival_margin"]) is not None:
-        rows.append((iface_("Next Rival"), _behind(margin)))
+        # its search ends as soon as it is decided, so that this is only a bound
+        rows.append((iface_("Next Rival"), ("≥ " if margin >= 0 else "") + _behind(margin)))
     if (parts := found["overlap"]) is not None:
         rows += [
             (iface_("Shared Source"), f"{parts['source_share']:.0%}"),
