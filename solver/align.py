@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from .agreement import trust
-from .descriptors import diffused_mean_curvature, standardised
+from .descriptors import diffused_curvatures, standardised
 from .fit import algebraic_fit
 from .flatten import Flattening, flatten
 from .landmarks import usable_landmarks, with_landmarks
@@ -23,7 +23,7 @@ from .nonrigid import ROUNDS, Bending, Draft, drafted, finished
 from .overlap import Piece, piece, shared
 from .refine import refined
 from .rival import ELSEWHERE, Rival, best_rival
-from .sampling import extrema, farthest_points
+from .sampling import HORIZON, extrema, farthest_points
 from .search import SearchProgress, SearchResult, search
 
 
@@ -45,10 +45,8 @@ class AlignSettings:
         Hyperbolic radius of the match discs, in (0, 1). Default: each point's distance to its second nearest neighbour.
     z_max : float
         Bound on |z|, in (0, 1): how far the centres of the two discs may lie apart.
-    descriptor_scale : float
-        Standard deviation of the Gaussian that weighs differences of standardised descriptors.
-    smallest_weight : float
-        Pairs of a smaller weight are incompatible, in [0, 1).
+    compatible : float
+        Share of the target that a source point may match, in (0, 1]: what is most like it.
     reflect : str
         "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly.
     reflect_margin : float
@@ -73,8 +71,7 @@ class AlignSettings:
     targets: int = 1000
     radius: float | None = None
     z_max: float = 0.8337  # tanh(1.2)
-    descriptor_scale: float = 0.7
-    smallest_weight: float = 0.35
+    compatible: float = 0.2
     reflect: str = "auto"
     reflect_margin: float = 0.06
     take_rival: bool = False
@@ -94,8 +91,8 @@ class AlignSettings:
             raise ValueError(f"z_max must lie between 0 and 1, not {self.z_max}")
         if self.radius is not None and not 0 < self.radius < 1:
             raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
-        if not (self.descriptor_scale > 0 and 0 <= self.smallest_weight < 1):
-            raise ValueError("descriptor_scale must be above 0 and smallest_weight in [0, 1)")
+        if not 0 < self.compatible <= 1:
+            raise ValueError(f"compatible must be a share above 0 and at most 1, not {self.compatible}")
 
 
 @dataclass(frozen=True)
@@ -137,6 +134,8 @@ class Alignment:
         Vertices that stood for the surfaces in the search; `search.matches` index into these.
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of all vertices.
+    difference : float
+        By how much descriptors of points that belong together differ, from the search's matches.
     settings : AlignSettings
     bending : Bending or None
         Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not, or not
@@ -163,6 +162,7 @@ class Alignment:
     target_samples: Integers
     source_descriptors: Floats
     target_descriptors: Floats
+    difference: float
     settings: AlignSettings
     bending: Bending | None = None
     overlap: Overlap | None = None
@@ -297,9 +297,9 @@ def _matched(
     clock.begin("flatten target", "Flattening the target", 0.1)
     target = flatten(target_mesh, fill_holes=settings.fill_holes, outer_vertex=settings.target_outer)
     clock.begin("descriptors", "Measuring curvature", 0.2)
-    measured = diffused_mean_curvature(source_mesh, progress=clock.within(0.2, 0.25))
+    measured = diffused_curvatures(source_mesh, progress=clock.within(0.2, 0.25))
     source_descriptors = standardised(measured, source_mesh.vertex_areas)
-    measured = diffused_mean_curvature(target_mesh, progress=clock.within(0.25, 0.3))
+    measured = diffused_curvatures(target_mesh, progress=clock.within(0.25, 0.3))
     target_descriptors = standardised(measured, target_mesh.vertex_areas)
     clock.begin("sampling", "Choosing points", 0.3)
     source_samples = _samples(source, source_descriptors, settings.samples)
@@ -312,7 +312,7 @@ def _matched(
         covering_radius(target.disc[target_samples])
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
-        compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings),
+        compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
     )
     pairs, warnings = usable_landmarks(() if landmarks is None else landmarks, source, target)
     if len(pairs):
@@ -330,6 +330,9 @@ def _matched(
             "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
         )
     mobius = rival.mobius if settings.take_rival else found.mobius
+    difference = _usual_difference(
+        source_descriptors[source_samples[found.matches[:, 0]]], target_descriptors[target_samples[found.matches[:, 1]]]
+    )
     if settings.refine != "none":
         clock.begin("refine", "Refining", 0.9)
         mobius = refined(
@@ -338,7 +341,7 @@ def _matched(
             target,
             source_descriptors,
             target_descriptors,
-            settings.descriptor_scale,
+            difference,
             clock.within(0.9, 1.0),
         )
     if not found.certified:
@@ -353,6 +356,7 @@ def _matched(
         target_samples=target_samples,
         source_descriptors=source_descriptors,
         target_descriptors=target_descriptors,
+        difference=difference,
         settings=settings,
         margin=margin,
         rival=rival,
@@ -370,7 +374,7 @@ def _bent(found: Alignment, clock: _Part, landmarks: npt.ArrayLike | None) -> Al
         target,
         found.source_descriptors,
         found.target_descriptors,
-        found.settings.descriptor_scale,
+        found.difference,
     )
     draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.15))
     here, there = shared(draft, source, target, clock.within(0.15, 0.2))
@@ -512,7 +516,7 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
         inner.target,
         inner.source_descriptors,
         inner.target_descriptors,
-        inner.settings.descriptor_scale,
+        inner.difference,
     )
     said = "ambiguous: the best map of the pieces by themselves sends everything elsewhere"
     return replace(inner, mobius=mobius, warnings=(*inner.warnings, said))
@@ -529,8 +533,20 @@ def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Boo
 def compatibility(source: Floats, target: Floats, settings: AlignSettings) -> Floats:
     """Return the weight, (N1, N2), of each pair of descriptors: a Gaussian of their difference, 0 if it is small."""
     square = (source**2).sum(axis=1)[:, None] + (target**2).sum(axis=1) - 2 * source @ target.T
-    weights = np.exp(-np.maximum(square, 0) / (2 * settings.descriptor_scale**2))
-    return np.where(weights >= settings.smallest_weight, weights, 0.0)
+    rank = np.empty(square.shape)
+    np.put_along_axis(rank, np.argsort(square, axis=1, kind="stable"), np.arange(0.5, square.shape[1])[None], axis=1)
+    return np.maximum(1 - rank / (share * square.shape[1]), 0)
+
+
+def _usual_difference(source: Floats, target: Floats) -> float:
+    """Return the median distance of matched descriptors, (m, d) each: how alike these two surfaces are.
+
+    At least a tenth of what their standard deviation makes of it; the standard deviation itself where nothing matched.
+    """
+    most = float(np.sqrt(source.shape[1]))
+    if not len(source):
+        return most
+    return max(float(np.median(np.linalg.norm(source - target, axis=1))), 0.1 * most)
 
 
 def covering_radius(points: Complexes) -> Floats:
@@ -543,8 +559,8 @@ def covering_radius(points: Complexes) -> Floats:
 
 
 def _interior(flattening: Flattening) -> np.ndarray:
-    """Return which vertices, (n,), are in use and inside the disc, where hyperbolic discs exist."""
-    inside = np.isfinite(flattening.disc.real) & (np.abs(flattening.disc) < 1 - 1e-9)
+    """Return which vertices, (n,), are in use and far enough inside the disc for the search."""
+    inside = np.isfinite(flattening.disc.real) & (np.abs(flattening.disc) < HORIZON)
     inside[flattening.boundary] = False
     return inside
 

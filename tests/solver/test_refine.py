@@ -6,14 +6,14 @@ from scans import bumps
 from surfaces import planar, rings
 
 from solver import Mobius, flatten
-from solver.descriptors import diffused_mean_curvature, standardised
+from solver.descriptors import diffused_curvatures, standardised
 from solver.refine import refined
 
 
 @pytest.fixture(scope="module")
 def sheet():
     mesh = bumps(1200, seed=3)
-    return flatten(mesh), standardised(diffused_mean_curvature(mesh), mesh.vertex_areas)
+    return flatten(mesh), standardised(diffused_curvatures(mesh), mesh.vertex_areas)
 
 
 def farthest(a: Mobius, b: Mobius) -> float:

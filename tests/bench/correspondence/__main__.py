@@ -57,6 +57,8 @@ def line(row: Row) -> str:
         said.append("proved" if facts["certified"] else "NOT PROVED")
     if "reflected" in facts and facts["reflected"] != pair.reflected:
         said.append("WRONG SIDE")
+    if facts.get("unfolded", 0) >= 0.005:
+        said.append(f"{100 * facts['unfolded']:.0f} % UNBENT")
     said += [" ".join(w.split()[:2]).rstrip(":") for w in facts.get("warnings", ()) if w.startswith("ambiguous")]
     if facts.get("margin") is not None:
         said.append(f"side {facts['margin']:+.3f}, rival {facts['rival_margin']:+.3f}, value {facts['value']:.1f}")

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from solver import Alignment, AlignSettings, Mobius, align, correspond, search
 from solver.align import _samples
-from solver.descriptors import diffused_mean_curvature, standardised
+from solver.descriptors import diffused_curvatures, standardised
 from solver.fit import algebraic_fit, fitted
 from solver.locate import TriangulatedDisc
 
@@ -47,6 +47,7 @@ def _aligned(pair: Pair, refine: str) -> dict[str, np.ndarray]:
         "warnings": list(found.warnings),
         "z": [found.mobius.z.real, found.mobius.z.imag],
         "theta": found.mobius.theta,
+        "unfolded": 0.0 if found.bending is None else found.bending.repaired / len(pair.target.vertices),
     }
     if refine == "dense":
         return _packed("dense", found, facts)
@@ -134,9 +135,7 @@ def paper(pair: Pair, store: Store) -> Map:
     """
     source, target = pair.flat
     x, y = (
-        flat.disc[
-            _samples(flat, standardised(diffused_mean_curvature(flat.mesh), flat.mesh.vertex_areas), PAPER_SAMPLES)
-        ]
+        flat.disc[_samples(flat, standardised(diffused_curvatures(flat.mesh), flat.mesh.vertex_areas), PAPER_SAMPLES)]
         for flat in (source, target)
     )
     x = np.conj(x) if pair.reflected else x

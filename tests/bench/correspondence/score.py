@@ -46,7 +46,8 @@ class Score:
     of : int or None
         Landmark pairs.
     folded : float
-        Triangles of the target that are turned over or collapsed in the source's disc, in %.
+        Triangles of the target that are turned over or collapsed in the source's disc, in %. One that comes to lie with
+        all corners on the source's edge has no area however good the map: it does not count, unless turned over.
     doubted : float or None
         Points that have a counterpart and a confidence below 1/2, in %; None if the method has no confidence.
     overlooked : float or None
@@ -72,14 +73,18 @@ def score(pair: Pair, found: Map) -> Score:
     """Measure a map."""
     error = errors(pair, found, pair.known)
     marks = None if pair.landmarks is None else mutually_nearest(pair, found, pair.landmarks)
-    areas = signed_areas(found.at(pair, pair.flat[0].disc), pair.target.faces)
-    way = -1 if pair.reflected else 1
+    source, faces = pair.flat[0], pair.target.faces
+    areas = signed_areas(found.at(pair, source.disc), faces) * (-1 if pair.reflected else 1)
+    rim = np.zeros(len(source.disc), bool)
+    rim[np.concatenate([source.boundary, *source.holes])] = True
+    on_rim = (rim[source.mesh.faces[found.face]] | (found.barycentric < 1e-9)).all(axis=1)[faces].all(axis=1)
+    folded = np.where(on_rim, areas < -1e-12, areas <= 0)
     return Score(
         float(error.mean()),
         float(np.quantile(error, 0.95)),
         marks,
         None if pair.landmarks is None else len(pair.landmarks.face),
-        100 * float((way * areas <= 0).mean()),
+        100 * float(folded.mean()),
         None if found.confidence is None else 100 - _trusted(pair, found, pair.known),
         None if found.confidence is None or pair.beyond is None else _trusted(pair, found, pair.beyond),
     )

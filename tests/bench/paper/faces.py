@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from solver import TriangleMesh, flatten
-from solver.descriptors import diffused_mean_curvature
+from solver.descriptors import diffused_curvatures
 from solver.sampling import extrema, farthest_points
 
 from .data import DATA, absent, read
@@ -31,7 +31,7 @@ def side(mesh: TriangleMesh, landmarks: np.ndarray) -> Side:
     flat = flatten(mesh, "mid-edge")
     inside = np.isfinite(flat.disc.real) & (np.abs(flat.disc) < 1 - 1e-6)
     inside[flat.boundary] = False
-    curvature = diffused_mean_curvature(mesh)[:, 1]
+    curvature = diffused_curvatures(mesh)[:, 1]
     strongest = extrema(mesh, curvature, inside)[: SAMPLES // 8]
     return Side(mesh, flat.disc, farthest_points(mesh, SAMPLES, strongest, inside), landmarks)
 
