@@ -530,8 +530,12 @@ def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Boo
     return ~target_cut & ~source_cut[nearest]
 
 
-def compatibility(source: Floats, target: Floats, settings: AlignSettings) -> Floats:
-    """Return the weight, (N1, N2), of each pair of descriptors: a Gaussian of their difference, 0 if it is small."""
+def compatibility(source: Floats, target: Floats, share: float) -> Floats:
+    """Return the weight, (N1, N2), of each pair of descriptors, from how rare it is to be so alike.
+
+    1 - p / share, at least 0, where p is the share of the target that is more like the source point. So weights need no
+    unit of likeness: whatever the noise, each source point may match as much of the target.
+    """
     square = (source**2).sum(axis=1)[:, None] + (target**2).sum(axis=1) - 2 * source @ target.T
     rank = np.empty(square.shape)
     np.put_along_axis(rank, np.argsort(square, axis=1, kind="stable"), np.arange(0.5, square.shape[1])[None], axis=1)

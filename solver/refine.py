@@ -10,6 +10,7 @@ from .flatten import Flattening
 from .locate import TriangulatedDisc
 from .mesh import Complexes, Floats, Integers
 from .mobius import Mobius
+from .sampling import HORIZON
 
 MOST_VERTICES = 3000
 """Of larger sources every so many-th vertex is used: three parameters need no more."""
@@ -44,11 +45,58 @@ def refined(
     """
     used = np.flatnonzero(np.isfinite(source.disc.real))
     used = used[:: -(-len(used) // MOST_VERTICES)]
-    points, expected = source.disc[used], source_descriptors[used]
-    weights = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
-    faces = target.mesh.faces
-    disc = TriangulatedDisc.of(target.disc, faces)
-    slopes = _slopes(target.disc, faces, target_descriptors)
+    share = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
+    disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
+    slopes = _slopes(target.disc, target.mesh.faces, target_descriptors)
+    for seen in _stages(1 - np.abs(source.disc[used]), share):
+        chosen = used[seen]
+        mobius = _improved(
+            mobius,
+            source.disc[chosen],
+            source_descriptors[chosen],
+            share[seen],
+            disc,
+            target_descriptors,
+            slopes,
+            scale,
+        )
+    return mobius
+
+
+def _stages(depth: Floats, share: Floats) -> list[Integers]:
+    """Return the points to use one stage after another, the last time all: (k,) int each.
+
+    The nearer a point lies to the rim, the farther it moves for a small change of the transformation, so what is far
+    inside comes first and brings the rest into reach. There is one stage where less than a hundredth of the area lies
+    outside the search's horizon: surfaces about as wide as long.
+
+    Parameters
+    ----------
+    depth : (n,) float64
+        Distance of each point from the rim.
+    share : (n,) float64
+        Of the area.
+    """
+    stages, reach = [], 1 - HORIZON
+    inside = depth > 1e-9  # the boundary's own vertices are only in the last stage
+    while share[inside & (depth < reach)].sum() > 0.01:
+        stages.append(np.flatnonzero(depth >= reach))
+        reach /= 4
+    return [*stages, np.arange(len(depth))]
+
+
+def _improved(
+    mobius: Mobius,
+    points: Complexes,
+    expected: Floats,
+    weights: Floats,
+    disc: TriangulatedDisc,
+    target_descriptors: Floats,
+    slopes: Complexes,
+    scale: float,
+) -> Mobius:
+    """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
+    faces = disc.faces
 
     def agreement(trial: Mobius) -> tuple[float, Complexes, Integers, Floats, Floats]:
         place = trial(points)

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scans import bumps
-from surfaces import planar, rings
+from surfaces import planar, rectangle, rings
 
-from solver import Mobius, flatten
+from solver import Mobius, TriangleMesh, flatten
 from solver.descriptors import diffused_curvatures, standardised
-from solver.refine import refined
+from solver.refine import _stages, refined
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +61,32 @@ def test_without_relief_it_stays_where_it_is():
     flat = np.zeros((len(flattening.disc), 4))
     start = Mobius(0.2, 0.3)
     assert refined(start, flattening, flattening, flat, flat, 0.7) == start
+
+
+def test_what_lies_near_the_rim_comes_later():
+    depth = np.array([0.0, 1e-5, 1e-3, 0.1, 0.5])
+    assert [list(seen) for seen in _stages(depth, np.array([0.5, 0.0, 0.0, 0.25, 0.25]))] == [[0, 1, 2, 3, 4]]
+    stages = _stages(depth, np.full(5, 0.2))
+    assert [list(seen) for seen in (stages[0], stages[1], stages[-2], stages[-1])] == [
+        [3, 4],
+        [2, 3, 4],
+        [2, 3, 4],
+        [0, 1, 2, 3, 4],
+    ]
+    assert len(stages) < 8
+
+
+def test_a_band_is_refined_to_its_ends():
+    """Half of a band eight times as long as wide lies within 1/300 of the rim; a theta 0.002 off is far off there."""
+    points = rectangle(120, 1 / 8)
+    rng = np.random.default_rng(2)
+    height = sum(
+        0.02 * np.exp(-(np.abs(points - complex(x, y)) ** 2) / (2 * 0.03**2))
+        for x, y in zip(rng.uniform(-1, 1, 60), rng.uniform(-1 / 8, 1 / 8, 60), strict=True)
+    )
+    flat = planar(points)
+    band = TriangleMesh(np.column_stack([points.real, points.imag, height]), flat.faces, "band")
+    disc, descriptors = flatten(band), standardised(diffused_curvatures(band), band.vertex_areas)
+    found = refined(Mobius(0.002, 0.002), disc, disc, descriptors, descriptors, 0.7)
+    assert abs(found.z) < 1e-6
+    assert abs(found.theta) < 1e-6

@@ -53,6 +53,8 @@ def line(row: Row) -> str:
     said = []
     if measured.overlooked is not None:
         said.append(f"overlooked {measured.overlooked:.0f} %, doubted {measured.doubted:.0f} %")
+    if facts.get("overlap") is not None:
+        said.append(f"the overlap's {100 * facts['overlap']:.0f} % alone")
     if "certified" in facts:
         said.append("proved" if facts["certified"] else "NOT PROVED")
     if "reflected" in facts and facts["reflected"] != pair.reflected:

@@ -22,19 +22,18 @@ STAGES = ("none", "mobius", "dense")
 
 def stages(pair: Pair, wanted: list[str], store: Store) -> dict[str, Map]:
     """Return the maps after the wanted stages of `align`, with its default settings."""
-    result = {}
-    # the dense stage is the slow one: the others do not wait for it, and do not change with its code
-    for refine, names in (("mobius", STAGES[:2]), ("dense", STAGES[2:])):
-        if chosen := [name for name in names if name in wanted]:
-            left_out = ("nonrigid", "surface_points") if refine == "mobius" else ()
-            key = f"{pair.kind} {refine} {pair.digest} {code('report', 'baselines', *left_out)}"
-            kept = store.kept(key, lambda refine=refine: _aligned(pair, refine))
-            result |= {name: _unpacked(kept, name) for name in chosen}
-    return result
+    if not any(name in wanted for name in STAGES):
+        return {}
+    # the dense stage is the slow one: without it the others are found without it, and do not change with its code
+    refine, left_out = ("dense", ()) if "dense" in wanted else ("mobius", ("nonrigid", "surface_points", "overlap"))
+    key = f"{pair.kind} {refine} {pair.digest} {code('report', 'baselines', *left_out)}"
+    kept = store.kept(key, lambda: _aligned(pair, refine))
+    return {name: _unpacked(kept, name) for name in STAGES if name in wanted}
 
 
 def _aligned(pair: Pair, refine: str) -> dict[str, np.ndarray]:
     found = align(pair.source, pair.target, AlignSettings(refine=refine, fill_holes=pair.openings))
+    bending = found.bending if found.overlap is None else found.overlap.alignment.bending
     facts = {
         "seconds": found.seconds,
         "value": found.search.value,
@@ -47,11 +46,12 @@ def _aligned(pair: Pair, refine: str) -> dict[str, np.ndarray]:
         "warnings": list(found.warnings),
         "z": [found.mobius.z.real, found.mobius.z.imag],
         "theta": found.mobius.theta,
-        "unfolded": 0.0 if found.bending is None else found.bending.repaired / len(pair.target.vertices),
+        "unfolded": 0.0 if bending is None else bending.repaired / len(pair.target.vertices),
+        "overlap": None if found.overlap is None else found.overlap.target_share,
     }
-    if refine == "dense":
-        return _packed("dense", found, facts)
-    return _packed("none", replace(found, mobius=found.search.mobius), facts) | _packed("mobius", found, facts)
+    whole = replace(found, bending=None, overlap=None, counterpart=None)
+    result = _packed("none", replace(whole, mobius=found.search.mobius), facts) | _packed("mobius", whole, facts)
+    return result | _packed("dense", found, facts) if refine == "dense" else result
 
 
 def _packed(name: str, alignment: Alignment, facts: dict) -> dict[str, np.ndarray]:
