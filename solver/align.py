@@ -538,7 +538,7 @@ def compatibility(source: Floats, target: Floats, share: float) -> Floats:
     """
     square = (source**2).sum(axis=1)[:, None] + (target**2).sum(axis=1) - 2 * source @ target.T
     rank = np.empty(square.shape)
-    np.put_along_axis(rank, np.argsort(square, axis=1, kind="stable"), np.arange(0.5, square.shape[1])[None], axis=1)
+    np.put_along_axis(rank, np.argsort(square, axis=1, kind="stable"), 0.5 + np.arange(square.shape[1])[None], axis=1)
     return np.maximum(1 - rank / (share * square.shape[1]), 0)
 
 

@@ -30,9 +30,8 @@ def diffused_curvatures(
     First the mean curvature of the diffused surface at each time: positions are diffused by one implicit step of
     (M + t A L) x_t = M x, as in Desbrun et al. (1999); mean curvature is L x_t / (2 M) along the normal, positive where
     the surface is convex. Then, at each time, the diffused Gauss curvature of the surface itself: the mean, by the same
-    step, of the angles that are missing around the vertices inside, as its signed root, to be a curvature too. All are
-    curvatures of length 1 over area 1; 0 at vertices in no face. `progress` is called with the share of the work done,
-    in [0, 1], and may raise to end it.
+    step, of the angles that are missing around the vertices inside, as its signed root, to be a curvature too. 0 at
+    vertices in no face. `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
     """
     area = mesh.area
     stiffness, masses = laplacian(mesh), mesh.vertex_areas

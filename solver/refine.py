@@ -48,7 +48,9 @@ def refined(
     share = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
     disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
     slopes = _slopes(target.disc, target.mesh.faces, target_descriptors)
-    for seen in _stages(1 - np.abs(source.disc[used]), share):
+    depth: Floats = 1.0 - np.abs(source.disc[used]).astype(np.float64)
+    stages = _stages(depth, share)
+    for number, seen in enumerate(stages):
         chosen = used[seen]
         mobius = _improved(
             mobius,
@@ -59,6 +61,7 @@ def refined(
             target_descriptors,
             slopes,
             scale,
+            None if progress is None else lambda done, n=number: progress((n + done) / len(stages)),
         )
     return mobius
 
@@ -94,6 +97,7 @@ def _improved(
     target_descriptors: Floats,
     slopes: Complexes,
     scale: float,
+    progress: Callable[[float], None] | None,
 ) -> Mobius:
     """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
     faces = disc.faces
