@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from .agreement import trust
+from .confidence import BOUND, confidence
 from .descriptors import diffused_curvatures, standardised
 from .fit import algebraic_fit
 from .flatten import Flattening, flatten
@@ -115,6 +116,9 @@ SMALLEST_OVERLAP = 0.1
 SETTLED = 0.005
 """Change of the shares without a counterpart below which an overlap is settled."""
 
+DOUBTFUL = 0.5
+"""Mean confidence up to which the whole map is doubted aloud."""
+
 DRAFTS = 4
 """Drafts at most until the overlap is settled."""
 
@@ -194,6 +198,11 @@ class Alignment:
         used = np.isfinite(places.real)
         places[used] = self.mobius.inverse()(places[used])
         return places
+
+    @cached_property
+    def confidence(self) -> Floats:
+        """Probability that each target vertex errs by less than `confidence.BOUND`, (n_target,)."""
+        return confidence(self)
 
     @cached_property
     def located(self) -> tuple[Integers, Floats]:
@@ -281,7 +290,12 @@ def align(
     if settings.refine == "dense":
         found = _bent(found, clock.part(0.7, 1), landmarks)
     clock.end()
-    return replace(found, seconds=clock.seconds)
+    found = replace(found, seconds=clock.seconds)
+    areas = target_mesh.vertex_areas * (found.confidence > 0)
+    if found.confidence @ areas <= DOUBTFUL * areas.sum():
+        said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
+        found = replace(found, warnings=(*found.warnings, said))
+    return found
 
 
 def _matched(

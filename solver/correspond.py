@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from .agreement import descriptor_distance, log_stretch
 from .align import Alignment
 from .flatten import Flattening
 from .mesh import Booleans, Complexes, Floats, Integers
@@ -24,9 +23,10 @@ class Correspondence:
     barycentric : (n, 3) float64
         Coordinates in that triangle: non-negative, sum 1; 0 where face is -1.
     matched : (n,) bool
-        Whether the surfaces agree there: confidence at least 1/2.
+        Whether it is more likely right than not: confidence at least 1/2.
     confidence : (n,) float64
-        In [0, 1]: how well the descriptors agree and how little the map stretches.
+        Probability that the point is off by less than 2 % of the source's bounding box diagonal, as `confidence.BOUND`
+        says; 0 where there is no counterpart.
     source_triangles : (m, 3) int
         Vertex indices of the source's triangles.
     source_size : int
@@ -57,11 +57,8 @@ def correspond(alignment: Alignment) -> Correspondence:
     source, target = alignment.source, alignment.target
     used = np.flatnonzero(np.isfinite(target.disc.real))
     face, barycentric = alignment.located
-    confidence = np.zeros(len(target.disc))
-    confidence[used] = _confidence(alignment, face[used], barycentric[used], used)
+    confidence = alignment.confidence.copy()
     confidence[used[in_openings(source, alignment.carried[used], face[used], barycentric[used])]] = 0
-    if alignment.counterpart is not None:
-        confidence[~alignment.counterpart] = 0
     return Correspondence(
         face=face,
         barycentric=barycentric,
@@ -80,20 +77,3 @@ def in_openings(flattening: Flattening, places: Complexes, face: Integers, baryc
     corners = flattening.mesh.faces[face]
     nearest = (flattening.disc[corners] * barycentric).sum(axis=1)
     return (on_rim[corners] | (barycentric == 0)).all(axis=1) & (np.abs(nearest - places) > 1e-9)
-
-
-def _confidence(alignment: Alignment, face: Integers, barycentric: Floats, used: Integers) -> Floats:
-    """Return the agreement of descriptors and of local scale, in [0, 1], at target vertices `used`."""
-    if alignment.overlap is not None:
-        parts = alignment.overlap
-        confidence = np.zeros(len(alignment.target.disc))
-        confidence[parts.target.vertices] = correspond(parts.alignment).confidence
-        return confidence[used]
-    distance = descriptor_distance(
-        alignment.source, alignment.source_descriptors, alignment.target_descriptors[used], face, barycentric
-    )
-    # two independent descriptors differ by a variance of 2 per component; half the confidence is lost at that distance
-    agreement = np.exp2(-(distance**2) / alignment.source_descriptors.shape[1] / 2)
-    stretch = log_stretch(alignment.source, alignment.target, alignment.carried, face, barycentric, used)
-    stretch -= np.median(stretch)
-    return agreement * np.exp2(-((stretch / np.log(3)) ** 2))
