@@ -93,7 +93,7 @@ def test_where_each_shows_more_than_the_other_the_rest_is_right(source_cut, targ
     has = np.isin(vertex, here)
     error = percent(places(found, source), sheet.vertices[vertex], sheet)
     assert error[has].mean() < 0.3
-    assert found.matched[has].mean() > 0.93
+    assert found.matched[has].mean() > 0.9
     if not has.all():
         assert found.matched[~has].mean() < 0.15
     assert any(warning.startswith("partial overlap: ") for warning in alignment.warnings)
