@@ -20,15 +20,15 @@ SIMPOP_ERROR = 0.3
 """Mean error in % that the dense map is to reach on SIMPOP."""
 
 TITLES = {
-    "best-mobius": "best Möbius there is",
-    "none": "**search**",
-    "mobius": "**+ all vertices**",
-    "dense": "**+ dense**",
-    "paper": "eq. 3",
-    "oracle-nearest": "true pose, nearest point",
+    "best-mobius": "best possible Möbius",
+    "none": "**ours**, the search alone",
+    "mobius": "**ours**, Möbius, all vertices",
+    "dense": "**ours**, dense (the default)",
+    "paper": "the paper's objective (eq. 3)",
+    "oracle-nearest": "best pose there is, nearest point",
     "pose": "open3d pose, nearest point",
     "meshmonk": "open3d, meshmonk",
-    "zoomout": "ZoomOut",
+    "zoomout": "functional maps, ZoomOut",
 }
 
 
@@ -54,19 +54,16 @@ def medians(rows: list[Row]) -> str:
     methods = [name for name in TITLES if any(row.method == name for row in rows)]
     kinds = list(dict.fromkeys(row.pair.kind for row in rows))
     lines = [
-        "| median error in %, pairs that are right | " + " | ".join(TITLES[name] for name in methods) + " |",
-        "|---" * (len(methods) + 1) + "|",
+        "| median error in %, pairs that are right | " + " | ".join(kinds) + " |",
+        "|---" * (len(kinds) + 1) + "|",
     ]
-    for kind in kinds:
+    for name in methods:
         cells = []
-        for name in methods:
+        for kind in kinds:
             of = [row for row in rows if row.pair.kind == kind and row.method == name]
-            cells.append(
-                f"{np.median([row.score.mean for row in of]):.2f}, {sum(row.right for row in of)} of {len(of)}"
-                if of
-                else ""
-            )
-        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+            right = f"{sum(row.right for row in of)} of {len(of)}"
+            cells.append(f"{np.median([row.score.mean for row in of]):.2f}, {right}" if of else "")
+        lines.append(f"| {TITLES[name]} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
