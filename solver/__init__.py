@@ -5,7 +5,8 @@ In the order of the pipeline: a `TriangleMesh` is checked (`topology`), flattene
 values (`interpolate`).
 """
 
-from .align import Alignment, AlignSettings, Cancelled, Progress, align
+from .align import align
+from .alignment import Alignment, AlignSettings
 from .circle_packing import silhouette_mesh
 from .cleaning import Cleaned, cleaned
 from .correspond import Correspondence, correspond
@@ -17,6 +18,7 @@ from .mesh import MeshError, TriangleMesh
 from .mobius import Mobius
 from .report import report
 from .search import SearchProgress, SearchResult, search
+from .stages import Cancelled, Progress
 from .topology import Topology, require_disc, topology
 
 __all__ = [

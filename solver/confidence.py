@@ -17,7 +17,7 @@ from .locate import TriangulatedDisc
 from .mesh import Floats
 
 if TYPE_CHECKING:
-    from .align import Alignment
+    from .alignment import Alignment
 
 BOUND = 0.02
 """Share of the source's bounding box diagonal: the confidence is the probability of a smaller error."""

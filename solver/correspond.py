@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from .align import Alignment
+from .alignment import Alignment
 from .flatten import Flattening
 from .mesh import Booleans, Complexes, Floats, Integers
 

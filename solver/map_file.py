@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .align import Alignment
+from .alignment import Alignment
 from .correspond import Correspondence
 
 

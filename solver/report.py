@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from .align import Alignment
+from .alignment import Alignment
 from .correspond import Correspondence
 from .mobius import Mobius
 

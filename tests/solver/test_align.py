@@ -6,8 +6,8 @@ import pytest
 from scans import bumps, mirrored, mutual_pairs, percent, places, posed, remeshed, shuffled
 
 from solver import Alignment, AlignSettings, Cancelled, MeshError, TriangleMesh, align, correspond, report
-from solver.align import compatibility, covering_radius
 from solver.mobius import hyperbolic_distance
+from solver.objective import compatibility, covering_radius
 
 SMALL = AlignSettings(samples=40, targets=300, reflect="never")
 """Enough for the surfaces here, and fast."""

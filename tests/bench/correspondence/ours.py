@@ -8,10 +8,10 @@ from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
 from solver import Alignment, AlignSettings, Mobius, align, correspond, search
-from solver.align import _samples
 from solver.descriptors import diffused_curvatures, standardised
 from solver.fit import algebraic_fit, fitted
 from solver.locate import TriangulatedDisc
+from solver.objective import source_points
 
 from .pairs import Pair, nearest
 from .score import Map
@@ -135,7 +135,9 @@ def paper(pair: Pair, store: Store) -> Map:
     """
     source, target = pair.flat
     x, y = (
-        flat.disc[_samples(flat, standardised(diffused_curvatures(flat.mesh), flat.mesh.vertex_areas), PAPER_SAMPLES)]
+        flat.disc[
+            source_points(flat, standardised(diffused_curvatures(flat.mesh), flat.mesh.vertex_areas), PAPER_SAMPLES)
+        ]
         for flat in (source, target)
     )
     x = np.conj(x) if pair.reflected else x
