@@ -14,7 +14,7 @@ from .access import (
 )
 from .carrier import Carrier
 from .masks import mask_names, mask_weights
-from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer, write_transfers
+from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer, restored_on_failure, write_transfers
 from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
 from .unmatched import Unmatched, carrier_between, unmatched_vertices
@@ -48,6 +48,7 @@ __all__ = [
     "numbered",
     "plan_transfer",
     "read_transfer",
+    "restored_on_failure",
     "split_names",
     "unmatched_vertices",
     "write_transfers",

@@ -288,7 +288,7 @@ def write_transfers(pairs: Sequence[tuple[bpy.types.Object, Transfer]]) -> None:
     """Write what was carried to each target; if one of them fails, all are as they were."""
     with ExitStack() as stack:
         for obj, _ in pairs:
-            stack.enter_context(_restored_on_failure(obj))
+            stack.enter_context(restored_on_failure(obj))
         for obj, transfer in pairs:
             _write(obj, transfer)
 
@@ -307,7 +307,7 @@ def _write(obj: bpy.types.Object, transfer: Transfer) -> None:
 
 
 @contextmanager
-def _restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
+def restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
     """Put the object's mesh back as it was if the body fails: Blender takes no undo step of a failed operator."""
     mesh = obj.data
     keys = mesh.shape_keys
@@ -316,8 +316,9 @@ def _restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        mesh.user_remap(backup)
-        bpy.data.meshes.remove(mesh)
+        failed = obj.data  # another mesh than before if one of these inside this one has put it back
+        failed.user_remap(backup)
+        bpy.data.meshes.remove(failed)
         backup.name = names[0]
         if backup.shape_keys:
             backup.shape_keys.name = names[1]

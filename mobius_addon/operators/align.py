@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ... import solver
 from ...solver.mesh import Floats
 from .. import landmarks, results, stored_alignment
-from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT
+from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, scale_warning
@@ -95,9 +95,13 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         return found[0], found[1]
 
     def keep(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
-        """Write an alignment on both meshes and report it."""
-        write_alignment(source, target, done.alignment, done.correspondence, self.surfaces)
-        stored_alignment.store(target, source, done.alignment, done.correspondence, self.surfaces)
+        """Write an alignment on both meshes; if that fails, both are as they were."""
+        with restored_on_failure(source), restored_on_failure(target):
+            write_alignment(source, target, done.alignment, done.correspondence, self.surfaces)
+            stored_alignment.store(target, source, done.alignment, done.correspondence, self.surfaces)
+
+    def announce(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
+        """Report an alignment."""
         for warning in [scale_warning(source), scale_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, warning)
@@ -139,7 +143,9 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: Aligned) -> None:
         """Write on both meshes, if they are still what was read."""
-        self.keep(*self.objects(), result)
+        pair = self.objects()
+        self.keep(*pair, result)
+        self.announce(*pair, result)
 
 
 def write_alignment(

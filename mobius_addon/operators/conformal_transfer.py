@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import Correspondence
 from .. import results, stored_alignment
-from ..attributes import SHARED_COLOR, SHARED_LAYOUT
+from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..jobs import Report, Work, why_busy
 from ..mesh_data import Refusal, read_surface
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, TransferOptions, draw_transfer, transfer_settings
@@ -67,14 +67,17 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
         return align_if_needed
 
     def finish(self, context: bpy.types.Context, result: Aligned | Correspondence) -> None:
-        """Carry the data through the correspondence, then write both."""
+        """Carry the data through the correspondence, then write both; if either fails, nothing is written."""
         source, target = self.objects()
         found = result.correspondence if isinstance(result, Aligned) else result
         settings = transfer_settings(self)
         plan = read_through(source, target, self.surfaces, found, settings).carry()
+        with restored_on_failure(source), restored_on_failure(target):
+            if isinstance(result, Aligned):
+                self.keep(source, target, result)
+            plan.write(target)
         if isinstance(result, Aligned):
-            self.keep(source, target, result)
-        plan.write(target)
+            self.announce(source, target, result)
         tell(self.report, target.name, source.name, plan)
         context.scene.mobius.source, context.scene.mobius.target = source, target
 

@@ -403,6 +403,45 @@ def test_nothing_is_written_where_there_is_nothing_to_carry(pair: tuple[Any, Any
     assert [everything(obj) for obj in pair] == before
 
 
+def test_a_failure_of_the_transfer_takes_the_alignment_back(
+    pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mobius_extension.mobius_addon.attributes import plan
+
+    source, target = pair
+    choose(*pair)
+    names = [mesh.name for mesh in bpy.data.meshes]
+    before = [everything(obj) for obj in pair]
+    write = plan._write
+
+    def fails(*given: Any) -> None:
+        assert stored_alignment.exists(target, source)  # the alignment is there by now
+        write(*given)
+        raise MemoryError("no memory")
+
+    monkeypatch.setattr(plan, "_write", fails)
+    with pytest.raises(RuntimeError, match="no memory"):
+        bpy.ops.mobius.conformal_transfer(**QUICK)
+    assert [everything(obj) for obj in pair] == before
+    assert not stored_alignment.exists(target, source)
+    assert [mesh.name for mesh in bpy.data.meshes] == names
+    monkeypatch.undo()
+    assert bpy.ops.mobius.conformal_transfer(**QUICK) == {"FINISHED"}
+
+
+def test_a_failure_of_storing_takes_back_what_align_has_written(
+    pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any) -> None:
+        raise MemoryError("no memory")
+
+    before = [everything(obj) for obj in pair]
+    monkeypatch.setattr(stored_alignment, "store", fails)
+    with pytest.raises(RuntimeError, match="no memory"):
+        bpy.ops.mobius.align(**QUICK)
+    assert [everything(obj) for obj in pair] == before
+
+
 def test_the_selection_has_to_be_two_meshes(pair: tuple[Any, Any]) -> None:
     choose(pair[0])
     with pytest.raises(RuntimeError, match="Select two meshes, the target last: it is the active one"):
