@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-QUICK = {"samples": 12, "targets": 80, "reflect": "never", "refine": "none"}
+QUICK = {"samples": 50, "targets": 200, "reflect": "never", "refine": "none"}
 """Settings of an alignment that takes a tenth of a second."""
 
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]

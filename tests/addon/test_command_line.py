@@ -16,7 +16,7 @@ from mobius_extension.mobius_addon.command_line import main  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ["--samples", "12", "--targets", "80", "--reflect", "never", "--refine", "none"]
+QUICK = ["--samples", "50", "--targets", "200", "--reflect", "never", "--refine", "none"]
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 from mobius_extension.solver import AlignSettings, Flattening, MeshError, TriangleMesh  # noqa: E402
 
 DATA = Path(os.environ.get("MOBIUS_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
-QUICK_FLAGS = ["--samples", "12", "--targets", "80", "--reflect", "never", "--refine", "none"]
+QUICK_FLAGS = ["--samples", "50", "--targets", "300", "--reflect", "never", "--refine", "mobius"]
 
 
 def holed(name: str = "Holed", n: int = 12) -> Any:
@@ -414,11 +414,13 @@ def test_flatten_command_takes_the_named_boundary(scans: Path, capsys: pytest.Ca
 def test_align_and_transfer_commands(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = run(capsys, "align", "holed.obj", "sheet.obj", "--fill-holes", "--report", "r.json", *QUICK_FLAGS)
     assert status == 0
-    assert err == "mobius: warning: 'holed.obj': 2 openings (10, 4 edges) closed, for the computation only\n"
+    # so coarse a sheet may add that it is in doubt
+    first = "mobius: warning: 'holed.obj': 2 openings (10, 4 edges) closed, for the computation only"
+    assert err.splitlines()[0] == first
     found = strict(scans / "r.json")
     assert set(found["distortion"]["source"]) == set(found["distortion"]["target"]) == DISTORTION
     assert found["settings"]["fill_holes"] is True
-    assert len(found["warnings"]) == 1
+    assert [f"mobius: warning: {said}" for said in found["warnings"]] == err.splitlines()
     status, _, err = run(
         capsys, "transfer", "sheet.obj", "parts.obj", "-o", "o.blend", "--report", "r.json",
         "--map", "m.npz", "--largest-part", "--only", "uv", *QUICK_FLAGS,
@@ -470,7 +472,7 @@ def test_a_face_with_open_mouth_and_eyes_aligns_with_another_expression(tmp_path
         read_surface(files.import_mesh(str(folder / f"{name}.obj")).obj).mesh
         for name in ("ict_neutral_with_holes", "ict_M_happy_level4")
     )
-    settings = AlignSettings(samples=50, targets=400, reflect="never", fill_holes=True, time_limit=20)
+    settings = AlignSettings(reflect="never", fill_holes=True)
     alignment, found = aligned(source, target, settings)
     assert sorted(len(loop) for loop in alignment.source.holes) == [42, 42, 74]
     there = found.matrix() @ source.vertices

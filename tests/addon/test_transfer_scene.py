@@ -22,7 +22,7 @@ def align_all(source: Any, targets: list[Any], chosen: Any) -> None:
     scene.mobius.source = source
     for target in [x for x in targets if x != chosen] + [chosen]:
         scene.mobius.target = target
-        assert bpy.ops.mobius.align(**QUICK | {"refine": "mobius"}) == {"FINISHED"}
+        assert bpy.ops.mobius.align(**QUICK | {"refine": "dense"}) == {"FINISHED"}
 
 
 @pytest.fixture
