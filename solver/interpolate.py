@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,11 +12,14 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .correspond import Correspondence
-from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
+from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides, undirected_edges
 from .surface_points import nearest_in_triangle
 
 _REACH = 4.0
 """How much faster than at the two ends a value may change between two points of one side of a seam."""
+
+_PIECE = 2048
+"""Of so many matrices everything fits in the processor's cache."""
 
 
 def interpolate(correspondence: Correspondence, values: npt.ArrayLike) -> Floats:
@@ -45,7 +48,48 @@ def value_islands(triangles: Integers, corner_values: Floats) -> Integers:
     corner_values : (3 m, d) float64
         A value per corner of each triangle, as of a UV map.
     """
-    return Charts.of(triangles, corner_values).island
+    joints = Joints.of(triangles)
+    return Charts.of(joints, corner_values, joints.equal(corner_values)).island
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """Corners that meet at the ends of the sides that two triangles share.
+
+    Attributes
+    ----------
+    triangles : (m, 3) int
+    side, other : (s,) int
+        The two sides, as `twin_sides` numbers them.
+    ends, ends_beyond : (s, 2) int
+        The corners at both ends of each, and those of the triangle beyond it at the same vertices.
+    """
+
+    triangles: Integers
+    side: Integers
+    other: Integers
+    ends: Integers
+    ends_beyond: Integers
+
+    @staticmethod
+    def of(triangles: Integers) -> Joints:
+        """Find them."""
+        vertex = triangles.ravel()
+        twin = twin_sides(edges_of_sides(triangles, int(vertex.max()) + 1)[1])
+        side = np.flatnonzero(twin > np.arange(len(twin)))
+        other = twin[side]
+        corners = np.arange(len(vertex)).reshape(-1, 3)
+        ends, ends_beyond = directed_edges(corners)[side], directed_edges(corners)[other]
+        crossed = vertex[ends[:, 0]] != vertex[ends_beyond[:, 0]]
+        ends_beyond[crossed] = ends_beyond[crossed, ::-1]
+        return Joints(triangles, side, other, ends, ends_beyond)
+
+    def equal(self, corner_values: Floats) -> Booleans:
+        """Return whether values, (3 m, d), agree across each side at each of its ends, (s, 2)."""
+        equal = np.ones(self.ends.shape, bool)
+        for component in corner_values.T:
+            equal &= component[self.ends] == component[self.ends_beyond]
+        return equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,23 +121,13 @@ class Charts:
     slit: Booleans
 
     @staticmethod
-    def of(triangles: Integers, corner_values: Floats, twin: Integers | None = None) -> Charts:
-        """Find the charts of values, (3 m, d), at the corners of triangles, (m, 3); `twin` is `twin_sides` of them."""
-        size, vertex_count = len(triangles), int(triangles.max()) + 1
-        values = corner_values.reshape(size, 3, -1)
-        if twin is None:
-            twin = twin_sides(edges_of_sides(triangles, vertex_count)[1])
-        side = np.flatnonzero(twin > np.arange(len(twin)))
-        other = twin[side]
-        corners = np.arange(3 * size).reshape(size, 3)
-        # the corners at both ends of each side, and those of the triangle beyond it at the same vertices
-        ends, ends_beyond = directed_edges(corners)[side], directed_edges(corners)[other]
+    def of(joints: Joints, corner_values: Floats, equal: Booleans) -> Charts:
+        """Find the charts of values, (3 m, d), at the corners of triangles; `equal` is `joints.equal` of them."""
+        triangles, side, other = joints.triangles, joints.side, joints.other
         vertex = triangles.ravel()
-        crossed = vertex[ends[:, 0]] != vertex[ends_beyond[:, 0]]
-        ends_beyond[crossed] = ends_beyond[crossed, ::-1]
-        flat = values.reshape(3 * size, -1)
-        equal = (flat[ends] == flat[ends_beyond]).all(axis=2)
-        wedge = _labels(3 * size, ends[equal], ends_beyond[equal])
+        size, vertex_count = len(triangles), int(vertex.max()) + 1
+        values = corner_values.reshape(size, 3, -1)
+        wedge = _labels(3 * size, joints.ends[equal], joints.ends_beyond[equal])
         runs_on = equal.all(axis=1)
         island = _labels(size, side[runs_on] // 3, other[runs_on] // 3)
         neighbours = np.full(3 * size, -1)
@@ -118,6 +152,44 @@ class Charts:
         row = np.repeat(np.arange(len(vertices)), stop - start)
         offset = np.arange(len(row)) - np.repeat(np.cumsum(stop - start) - (stop - start), stop - start)
         return corner[start[row] + offset], row
+
+
+@dataclass(frozen=True, eq=False)
+class _BesideSeams:
+    """The target's corners beside the seams of some charts, with what does not depend on the values.
+
+    Attributes
+    ----------
+    charts : Charts
+    source_vertices : (n_source, 3) float64
+    corners : (c,) int
+        Corners, 3 t + 0, 1 or 2, of target triangles.
+    face, weights, place, group : (c,), (c, 3), (c, 3), (c,)
+        Where each lies on the source, and to which of the groups that follow it belongs.
+    middle, anchor, anchor_weights : (g, 3), (g,), (g, 3)
+        Each group's middle, the source triangle it lies in, and where in it.
+    """
+
+    charts: Charts
+    source_vertices: Floats
+    corners: Integers
+    face: Integers
+    weights: Floats
+    place: Floats
+    group: Integers
+    middle: Floats
+    anchor: Integers
+    anchor_weights: Floats
+
+    def values(self, corner_values: Floats) -> Floats:
+        """Return the values, (c, d), of the corners from source values, (3 m, d), that break at the same seams."""
+        charts = replace(self.charts, values=corner_values.reshape(len(self.charts.triangles), 3, -1))
+        at_anchor = np.einsum("gk,gkd->gd", self.anchor_weights, charts.values[self.anchor])
+        its = self.group
+        return _on_side_of_anchor(
+            charts, self.source_vertices, self.face, self.weights, self.place,
+            self.anchor[its], at_anchor[its], self.middle[its],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,34 +230,56 @@ class CornerInterpolation:
         """
         triangles = self.correspondence.source_triangles
         given = np.asarray(source_corner_values, dtype=np.float64).reshape(3 * len(triangles), -1)
-        charts = Charts.of(triangles, given, self._twin)
-        face, weights = self.correspondence.face, self.correspondence.barycentric
-        at_vertex = np.zeros((len(face), given.shape[1]))
-        for k in range(3):  # weights are 0 where there is no face
-            at_vertex += weights[:, k, None] * given[3 * face + k]
+        at_vertex = self._at_vertex @ given
+        beside = self._beside_seams(given)
+        if beside is None:
+            return at_vertex, np.zeros(0, np.intp), np.zeros((0, given.shape[1]))
+        return at_vertex, beside.corners, beside.values(given)
+
+    def _beside_seams(self, given: Floats) -> _BesideSeams | None:
+        """Find what lies beside the seams of values, (3 ms, d); None: nothing does."""
+        equal = self._joints.equal(given)
+        key = equal.tobytes()
+        if key not in self._found:
+            self._found.clear()  # the last one is kept: UV maps of one mesh often have the same seams
+            self._found[key] = self._find_beside(Charts.of(self._joints, given, equal))
+        return self._found[key]
+
+    def _find_beside(self, charts: Charts) -> _BesideSeams | None:
         beside = self._groups_near_seams(charts)
         chosen = np.flatnonzero(beside[self.groups]) if beside.any() else np.zeros(0, np.intp)
+        face, weights = self.correspondence.face, self.correspondence.barycentric
         corner_vertex = self.target_triangles[chosen].ravel()
         known = face[corner_vertex] >= 0
         corners = (3 * chosen[:, None] + np.arange(3)).ravel()[known]
         if len(corners) == 0:
-            return at_vertex, corners, np.zeros((0, given.shape[1]))
+            return None
         group = np.repeat(np.unique(self.groups[chosen], return_inverse=True)[1].reshape(-1), 3)
         place = self._place[corner_vertex].reshape(-1, 3, 3)
         middle, rank = _middles(place, known.reshape(-1, 3), group[::3])
         own_face = face[corner_vertex]
-        anchor_face, anchor_value = _anchors(charts, self.source_vertices, middle, rank, own_face.reshape(-1, 3))
-        its = group[known]
-        values = _on_side_of_anchor(
-            charts, self.source_vertices, own_face[known], weights[corner_vertex[known]], place.reshape(-1, 3)[known],
-            anchor_face[its], anchor_value[its], middle[its],
+        anchors = _anchors(charts.triangles, self.source_vertices, middle, rank, own_face.reshape(-1, 3))
+        return _BesideSeams(
+            charts, self.source_vertices, corners, own_face[known], weights[corner_vertex[known]],
+            place.reshape(-1, 3)[known], group[known], middle, *anchors,
         )  # fmt: skip
-        return at_vertex, corners, values
 
     @cached_property
-    def _twin(self) -> Integers:
-        triangles = self.correspondence.source_triangles
-        return twin_sides(edges_of_sides(triangles, int(triangles.max()) + 1)[1])
+    def _found(self) -> dict[bytes, _BesideSeams | None]:
+        return {}
+
+    @cached_property
+    def _joints(self) -> Joints:
+        return Joints.of(self.correspondence.source_triangles)
+
+    @cached_property
+    def _at_vertex(self) -> csr_array:
+        """Takes values at source corners, (3 ms,), to target vertices; rows of 0 where there is no face."""
+        face = self.correspondence.face
+        corner = 3 * np.maximum(face, 0)[:, None] + np.arange(3)
+        rows = np.arange(0, 3 * len(face) + 1, 3)
+        shape = len(face), 3 * len(self.correspondence.source_triangles)
+        return csr_array((self.correspondence.barycentric.ravel(), corner.ravel(), rows), shape=shape)
 
     @cached_property
     def _place(self) -> Floats:
@@ -207,15 +301,19 @@ class CornerInterpolation:
         face, weights = self.correspondence.face, self.correspondence.barycentric
         known = face >= 0
         # inside one island a vertex has one value, but for slits and for what lies on the seam itself
-        on_seam = (weights * ~charts.seam[charts.triangles][face]).sum(axis=1) < 1e-9
+        off_seam = ~charts.seam[charts.triangles]
+        on_seam = np.einsum("qk,qk->q", weights, off_seam[face]) < 1e-9
         touching = known & (on_seam | charts.slit[charts.triangles].any(axis=1)[face])
         island = np.where(known, charts.island[face], -1)
-        a, b, c = (island[self.target_triangles[:, k]] for k in range(3))
+        corners = self.target_triangles.T
+        a, b, c = (island[corner] for corner in corners)
         across = ((a != b) & (a >= 0) & (b >= 0)) | ((b != c) & (b >= 0) & (c >= 0)) | ((c != a) & (c >= 0) & (a >= 0))
-        result[self.groups[touching[self.target_triangles].any(axis=1) | across]] = True
+        for corner in corners:
+            across |= touching[corner]
+        result[self.groups[across]] = True
         if charts.slit.any():
             centre, radius = self._circles
-            rest = np.flatnonzero(~result[self.groups] & known[self.target_triangles].all(axis=1))
+            rest = np.flatnonzero(~result[self.groups] & known[corners[0]] & known[corners[1]] & known[corners[2]])
             if len(rest):
                 tree = KDTree(self.source_vertices[np.flatnonzero(charts.slit)])
                 distance = tree.query(centre[rest], distance_upper_bound=radius[rest].max())[0]
@@ -359,8 +457,8 @@ def local_similarities(
     The scale is the ratio of the lengths of those sides. Both are the identity where nothing is known.
     """
     face, place = _places(correspondence, source.vertices)
-    edges = target.edges
-    edges = edges[(face[edges] >= 0).all(axis=1)]
+    edges = undirected_edges(target.faces, len(target.vertices))
+    edges = edges[(face[edges[:, 0]] >= 0) & (face[edges[:, 1]] >= 0)]
     # components in rows of their own: these are a million numbers each
     there, here = ((x[edges[:, 1]] - x[edges[:, 0]]).T.copy() for x in (place, target.vertices))
     size = len(face)
@@ -394,12 +492,25 @@ def nearest_orthogonal(matrices: Floats) -> Floats:
     """
     if len(matrices) == 0:
         return matrices
-    factor = np.ascontiguousarray(matrices.transpose(1, 2, 0))
-    determinant = _dot(factor[0], _cross(factor[1], factor[2]))
+    factors = np.ascontiguousarray(matrices.transpose(1, 2, 0))
+    determinant = _dot(factors[0], np.cross(factors[1], factors[2], axis=0))
     sign = np.sign(determinant)
     wanted = np.sign(sign.sum() or 1)
-    odd = (sign != wanted) | (np.abs(determinant) < 1e-6 * (factor**2).sum(axis=(0, 1)) ** 1.5)
-    factor[:, :, odd] = np.eye(3)[:, :, None]
+    odd = (sign != wanted) | (np.abs(determinant) < 1e-6 * np.einsum("abn,abn->n", factors, factors) ** 1.5)
+    result = np.empty(matrices.shape)
+    for first in range(0, len(matrices), _PIECE):
+        piece = slice(first, first + _PIECE)
+        factor = factors[:, :, piece].copy()
+        factor[:, :, odd[piece]] = np.eye(3)[:, :, None]
+        result[piece] = _orthogonal_factors(factor).transpose(2, 0, 1)
+    left, _, right = np.linalg.svd(matrices[odd])
+    left[np.sign(np.linalg.det(left @ right)) != wanted, :, 2] *= -1
+    result[odd] = left @ right
+    return result
+
+
+def _orthogonal_factors(factor: Floats) -> Floats:
+    """Return the orthogonal factors of the polar decompositions of well-conditioned matrices, (3, 3, n)."""
     for _ in range(30):
         inverse = _inverse_transposes(factor)
         balance = np.sqrt(np.sqrt((inverse**2).sum(axis=(0, 1)) / (factor**2).sum(axis=(0, 1))))
@@ -408,23 +519,18 @@ def nearest_orthogonal(matrices: Floats) -> Floats:
         factor = step
         if change < 1e-8:  # it converges quadratically
             break
-    result = np.ascontiguousarray(factor.transpose(2, 0, 1))
-    left, _, right = np.linalg.svd(matrices[odd])
-    left[np.sign(np.linalg.det(left @ right)) != wanted, :, 2] *= -1
-    result[odd] = left @ right
-    return result
+    return factor
 
 
 def _inverse_transposes(matrices: Floats) -> Floats:
     """Return the inverse of the transpose of each of some regular matrices, (3, 3, n): cofactors by determinant."""
-    a, b, c = matrices
-    cofactors = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)])
-    return cofactors / _dot(a, cofactors[0])
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    """Return cross products of columns, (3, n)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    cofactors = np.empty_like(matrices)
+    for k in range(3):
+        a, b = matrices[k - 2], matrices[k - 1]
+        for i in range(3):
+            cofactors[k, i] = a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2]
+    cofactors /= _dot(matrices[0], cofactors[0])
+    return cofactors
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
@@ -450,14 +556,16 @@ def _middles(place: Floats, known: Booleans, group: Integers) -> tuple[Floats, I
 
 
 def _anchors(
-    charts: Charts, vertices: Floats, middle: Floats, rank: Integers, face: Integers
+    triangles: Integers, vertices: Floats, middle: Floats, rank: Integers, face: Integers
 ) -> tuple[Integers, Floats]:
-    """Return the source triangle nearest to each group's middle, (g,), and the value there, (g, d)."""
+    """Return the source triangle nearest to each group's middle, (g,), and the barycentric coordinates there, (g, 3).
+
+    -1 and 0 for groups of which nothing is known.
+    """
     groups = np.flatnonzero(rank >= 0)
-    best, weights = _nearest_triangles(vertices[charts.triangles], middle[groups], face[rank[groups]])
-    anchor, value = np.full(len(middle), -1), np.zeros((len(middle), charts.values.shape[2]))
-    anchor[groups], value[groups] = best, np.einsum("qk,qkd->qd", weights, charts.values[best])
-    return anchor, value
+    anchor, weights = np.full(len(middle), -1), np.zeros((len(middle), 3))
+    anchor[groups], weights[groups] = _nearest_triangles(vertices[triangles], middle[groups], face[rank[groups]])
+    return anchor, weights
 
 
 def _nearest_triangles(corners: Floats, query: Floats, guesses: Integers) -> tuple[Integers, Floats]:

@@ -156,10 +156,18 @@ def directed_edges(faces: Integers) -> Integers:
 
 def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
     """Return undirected edges, (e, 2), each once, sorted, and the edge of each side in `directed_edges`, (3 m,)."""
-    start, stop = directed_edges(faces).T
-    keys = np.minimum(start, stop) * vertex_count + np.maximum(start, stop)
-    edges, edge_of_side = np.unique(keys, return_inverse=True)
+    edges, edge_of_side = np.unique(_edge_keys(faces, vertex_count), return_inverse=True)
     return np.stack(np.divmod(edges, vertex_count), axis=1), edge_of_side.reshape(-1)
+
+
+def undirected_edges(faces: Integers, vertex_count: int) -> Integers:
+    """Return the edges of `edges_of_sides` alone, which takes a fraction of the time."""
+    return np.stack(np.divmod(np.unique(_edge_keys(faces, vertex_count)), vertex_count), axis=1)
+
+
+def _edge_keys(faces: Integers, vertex_count: int) -> Integers:
+    start, stop = directed_edges(faces).T
+    return np.minimum(start, stop) * vertex_count + np.maximum(start, stop)
 
 
 def twin_sides(edge_of_side: Integers) -> Integers:

@@ -61,7 +61,7 @@ class Carrier:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
         at_vertex, rows, beside_seams = self._corner_interpolation(values[self.source.triangle_corners.ravel()])
         vertex = self.target.corner_vertex
-        result = at_vertex[vertex]
+        result = at_vertex.take(vertex, axis=0)
         result[self.target.triangle_corners.ravel()[rows]] = beside_seams
         result = result.reshape(len(vertex), *values.shape[1:])
         whole = self._whole_corners

@@ -4,6 +4,7 @@ from surfaces import planar, rings
 
 from solver import Correspondence, TriangleMesh, interpolate, interpolate_corners
 from solver.interpolate import (
+    CornerInterpolation,
     edges_in_reach,
     local_similarities,
     nearest_orthogonal,
@@ -156,6 +157,20 @@ def test_onto_an_identical_mesh_every_corner_comes_back_bit_for_bit(values, seed
     assert (carried == given).all()
 
 
+def test_one_interpolation_carries_layers_with_the_same_and_with_other_seams():
+    source, _ = sheet(20)
+    target, quad = sheet(13, 14)
+    found = planar_correspondence(source, target)
+    carry = CornerInterpolation(found, source.vertices, target.faces, quad)
+    charts = two_charts(source)
+    mirrored = charts * [-1, 2]  # broken at the same sides
+    for values in (charts, mirrored, fan(source), source.vertices[source.faces.ravel()], mirrored, charts):
+        at_vertex, corners, beside = carry(values)
+        result = at_vertex[target.faces.ravel()]
+        result[corners] = beside
+        assert (result == interpolate_corners(found, source.vertices, values, target.faces, quad)).all()
+
+
 def test_the_triangles_of_a_group_stay_together():
     source, _ = sheet(20)
     target, quad = sheet(13, 14)
@@ -275,3 +290,14 @@ def test_nearest_orthogonal_matrices_are_those_of_the_singular_values(kind):
     # that of rank one is not determined; the others are the best there are
     assert np.abs(found - left @ right)[3:].max() < 1e-9
     assert (nearest_orthogonal(np.eye(3)[None]) == np.eye(3)).all()
+    # nor does it matter how they lie in memory, and they stay as they are
+    other = np.ascontiguousarray(matrices.transpose(1, 2, 0)).transpose(2, 0, 1)
+    assert (nearest_orthogonal(other) == found).all()
+    assert (other == matrices).all()
+
+
+def test_nearest_orthogonal_matrices_of_many_are_those_of_each():
+    matrices = np.random.default_rng(2).normal(size=(5000, 3, 3))
+    matrices[np.linalg.det(matrices) < 0, 0] *= -1
+    left, _, right = np.linalg.svd(matrices)
+    assert np.abs(nearest_orthogonal(matrices) - left @ right).max() < 1e-9
