@@ -443,8 +443,7 @@ def edges_in_reach(
 
 def _places(correspondence: Correspondence, source_vertices: Floats) -> tuple[Integers, Floats]:
     """Return each target vertex's source triangle, (n,), and its place on the source, (n, 3)."""
-    corners = source_vertices[correspondence.source_triangles[correspondence.face]]
-    return correspondence.face, np.einsum("qk,qkd->qd", correspondence.barycentric, corners)
+    return correspondence.face, correspondence.matrix() @ source_vertices
 
 
 def local_similarities(

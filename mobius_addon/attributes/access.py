@@ -146,8 +146,9 @@ class AttributeAccess:
             name = made.name
         # fetched by name: up to Blender 5.0 references do not survive a new attribute
         data = attributes[name].data
-        stored = values.astype(self.dtype)
-        if not covered.all():
+        whole = covered.all()
+        stored = values.astype(self.dtype, copy=not whole)
+        if not whole:
             stored[~covered] = self.read(obj, name)[~covered]
         if self.dtype == "object":
             for item, value in zip(data, stored.tolist(), strict=True):

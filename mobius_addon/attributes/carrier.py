@@ -61,6 +61,8 @@ class Carrier:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
         at_vertex, rows, beside_seams = self._corner_interpolation(values[self.source.triangle_corners.ravel()])
         vertex = self.target.corner_vertex
+        if values.dtype == np.float32:  # there are several corners to a vertex: no more bytes than will be written
+            at_vertex = at_vertex.astype(np.float32)
         result = at_vertex.take(vertex, axis=0)
         result[self.target.triangle_corners.ravel()[rows]] = beside_seams
         result = result.reshape(len(vertex), *values.shape[1:])
