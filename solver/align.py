@@ -13,6 +13,7 @@ from .agreement import trust
 from .alignment import Alignment, AlignSettings, Overlap
 from .confidence import BOUND
 from .descriptors import diffused_curvatures, standardised
+from .distortion import signed_areas
 from .fit import algebraic_fit
 from .flatten import Flattening, flatten
 from .landmarks import usable_landmarks, with_landmarks
@@ -32,6 +33,9 @@ PARTIAL = 0.02
 
 SMALLEST_OVERLAP = 0.1
 """Share of either surface's area below which an overlap is no ground to go on from."""
+
+SURE = 1.645
+"""Standard errors by which the overlap has to match better by itself than the whole surfaces: one-sided, 95 %."""
 
 SETTLED = 0.005
 """Change of the shares without a counterpart below which an overlap is settled."""
@@ -216,7 +220,11 @@ def _bent(found: Alignment, clock: Part, landmarks: npt.ArrayLike | None) -> Ali
     warnings += tuple(f"in the overlap: {said}" for said in overlap.alignment.warnings)
     counterpart = np.zeros(len(target.disc), bool)
     counterpart[overlap.target.vertices] = overlap.alignment.counterpart
-    return replace(found, overlap=overlap, counterpart=counterpart, warnings=warnings)
+    found = replace(found, overlap=overlap, warnings=warnings)
+    # straight sides may cross the jags of a cut, though none is turned over in the piece's own disc
+    areas = signed_areas(found.carried, target.mesh.faces) * (-1 if found.mobius.reflected else 1)
+    counterpart[target.mesh.faces[areas <= 0]] = False
+    return replace(found, counterpart=counterpart)
 
 
 def _left_out(source: Flattening, target: Flattening, here: Booleans, there: Booleans) -> tuple[float, float]:
@@ -255,8 +263,8 @@ def _overlap(
         inner = _matched(source_part.mesh, target_part.mesh, settings, clock.part(0.2, 0.5, "overlap"), pairs)
     except MeshError:  # too small a piece to flatten
         return None
-    if _share(inner) <= _share(found):
-        return None  # what matches less by itself is no better founded
+    if not _surely_better(_matches(inner), _matches(found)):
+        return None
     used = np.flatnonzero(np.isfinite(found.target.disc.real))
     places = draft.places(found.target)
     normals = TriangleMesh(places, draft.whole.faces).vertex_normals()
@@ -281,9 +289,26 @@ def _overlap(
     return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
 
 
-def _share(found: Alignment) -> float:
-    """Return the share of the samples that match."""
-    return found.search.value / len(found.source_samples)
+def _matches(found: Alignment) -> Floats:
+    """Return the weight, (N1,), with which each source sample matched in the search; 0 where it did not."""
+    rows, columns = found.search.matches.T
+    weights = np.zeros(len(found.source_samples))
+    weights[rows] = compatibility(
+        found.source_descriptors[found.source_samples],
+        found.target_descriptors[found.target_samples],
+        found.settings.compatible,
+    )[rows, columns]
+    return weights
+
+
+def _surely_better(parts: Floats, whole: Floats) -> bool:
+    """Return whether the samples of the parts, (k,), match better than those of the whole, (l,), beyond chance.
+
+    The difference of the means in its standard errors (Welch 1947), against `SURE`: rims that merely differ a bit, or a
+    draft that was mistaken, gain no more than other samples would.
+    """
+    error = np.sqrt(parts.var() / len(parts) + whole.var() / len(whole))
+    return bool(parts.mean() - whole.mean() > SURE * error)
 
 
 def _within(landmarks: npt.ArrayLike | None, source: Piece, target: Piece) -> Integers | None:

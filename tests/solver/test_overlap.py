@@ -6,6 +6,7 @@ from scans import bumps, mirrored, percent, places, posed, remeshed
 from surfaces import planar, rings
 
 from solver import AlignSettings, TriangleMesh, align, correspond, flatten, topology
+from solver.align import _surely_better
 from solver.distortion import signed_areas
 from solver.overlap import depth_beyond, piece
 from solver.surface_points import SurfacePoints
@@ -105,6 +106,10 @@ def test_where_each_shows_more_than_the_other_the_rest_is_right(source_cut, targ
     common = sheet.vertex_areas[np.intersect1d(here, there)].sum()
     assert overlap.source_share * source.area == pytest.approx(common, rel=0.05)
     assert overlap.target_share * (1 - target_cut) == pytest.approx(common / sheet.area, rel=0.05)
+    assert alignment.counterpart is not None
+    both = target.faces[alignment.counterpart[target.faces].all(axis=1)]
+    turned = signed_areas(alignment.carried, both) * (-1 if reflected else 1)
+    assert (turned > 0).all()
     inner = overlap.alignment
     areas = signed_areas(inner.carried, inner.target.mesh.faces)
     assert ((areas < 0) if reflected else (areas > 0)).all()
@@ -121,7 +126,8 @@ def test_bent_sheets_may_overlap_in_part():
     has = np.isin(np.arange(len(rolled.vertices)), here)
     assert percent(places(found, source), flat.vertices, flat)[has].mean() < 1
     assert found.matched[~has].mean() < 0.15
-    assert found.matched[has].mean() > 0.9
+    assert alignment.counterpart is not None
+    assert alignment.counterpart[has].mean() > 0.95
 
 
 def test_surfaces_that_show_the_same_are_left_whole():
@@ -137,6 +143,16 @@ def test_surfaces_that_show_the_same_are_left_whole():
     assert alignment.overlap is None
     assert alignment.bending is not None
     assert not any("partial" in warning for warning in alignment.warnings)
+
+
+def test_pieces_that_match_no_better_than_chance_are_not_cut_out():
+    """Half the samples here and half there differ from the same half by nothing; other shares by their spread."""
+    half, rng = np.repeat([0.0, 1.0], 50), np.random.default_rng(0)
+    assert not _surely_better(half, half)
+    assert not _surely_better(np.repeat([0.0, 1.0], [45, 55]), half)
+    assert _surely_better(np.repeat([0.0, 1.0], [30, 70]), half)
+    taken = [_surely_better(rng.random(100), rng.random(100)) for _ in range(2000)]
+    assert np.mean(taken) == pytest.approx(0.05, abs=0.02)
 
 
 def test_a_cropped_face_is_found_on_another_persons(real_mesh):
