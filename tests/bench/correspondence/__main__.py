@@ -67,7 +67,7 @@ def line(row: Row) -> str:
     said.append(" ".join(f"{stage} {t:.1f}" for stage, t in facts.get("seconds", {}).items() if t >= 0.05))
     return (
         f"{pair.kind:10} {pair.name:36} {row.method:14} {measured.mean:6.2f} {measured.p95:6.2f} {marks:>6} "
-        f"{measured.folded:6.2f}  {'; '.join(said)}"
+        f"{measured.folded:6.2f} {measured.left_out:6.2f}  {'; '.join(said)}"
     )
 
 
@@ -90,7 +90,8 @@ def main() -> None:
             parser.error(f"unknown '{name}': use {', '.join(known)}")
     store = Store(options.output / "kept")
     rows: list[Row] = []
-    print(f"{'set':10} {'source > target':36} {'method':14} {'mean %':>6} {'95 %':>6} {'marks':>6} {'folds':>6}")
+    columns = " ".join(f"{name:>6}" for name in ("mean %", "95 %", "marks", "folds", "beyond"))
+    print(f"{'set':10} {'source > target':36} {'method':14} {columns}")
     for name in sets:
         for pair in SETS[name](store, options.pairs):
             for method, found in maps(pair, methods, store).items():

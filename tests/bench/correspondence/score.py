@@ -46,8 +46,11 @@ class Score:
     of : int or None
         Landmark pairs.
     folded : float
-        Triangles of the target that are turned over or collapsed in the source's disc, in %. One that comes to lie with
+        Triangles of the target that are turned over or collapsed in the source's disc, in % of all, among those whose
+        corners all have a counterpart (a confidence above 0; all, if the method has none). One that comes to lie with
         all corners on the source's edge has no area however good the map: it does not count, unless turned over.
+    left_out : float
+        Triangles of the target of which a corner has no counterpart, in %: they may lie on the source's edge.
     doubted : float or None
         Points that have a counterpart and a confidence below 1/2, in %; None if the method has no confidence.
     overlooked : float or None
@@ -59,6 +62,7 @@ class Score:
     marks: int | None
     of: int | None
     folded: float
+    left_out: float
     doubted: float | None
     overlooked: float | None
 
@@ -78,13 +82,15 @@ def score(pair: Pair, found: Map) -> Score:
     rim = np.zeros(len(source.disc), bool)
     rim[np.concatenate([source.boundary, *source.holes])] = True
     on_rim = (rim[source.mesh.faces[found.face]] | (found.barycentric < 1e-9)).all(axis=1)[faces].all(axis=1)
-    folded = np.where(on_rim, areas < -1e-12, areas <= 0)
+    left_out = np.zeros(len(faces), bool) if found.confidence is None else (found.confidence[faces] == 0).any(axis=1)
+    folded = np.where(on_rim, areas < -1e-12, areas <= 0) & ~left_out
     return Score(
         float(error.mean()),
         float(np.quantile(error, 0.95)),
         marks,
         None if pair.landmarks is None else len(pair.landmarks.face),
         100 * float(folded.mean()),
+        100 * float(left_out.mean()),
         None if found.confidence is None else 100 - _trusted(pair, found, pair.known),
         None if found.confidence is None or pair.beyond is None else _trusted(pair, found, pair.beyond),
     )

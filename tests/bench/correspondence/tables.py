@@ -68,16 +68,20 @@ def medians(rows: list[Row]) -> str:
 
 
 def folds(rows: list[Row]) -> str:
-    """Return the triangles that are turned over or collapsed: the median and the most, in %."""
+    """Return the triangles that are turned over or collapsed, the median and the most, and what has no counterpart."""
     methods = [name for name in TITLES if any(row.method == name for row in rows)]
     table = []
     for kind in dict.fromkeys(row.pair.kind for row in rows):
         line = {"set": kind}
         for name in methods:
-            of = [row.score.folded for row in rows if row.pair.kind == kind and row.method == name]
-            line[name] = f"{np.median(of):.2f} / {max(of):.2f}" if of else ""
+            of = [row.score for row in rows if row.pair.kind == kind and row.method == name]
+            line[name] = ""
+            if of:
+                folded, left_out = [x.folded for x in of], max(x.left_out for x in of)
+                line[name] = f"{np.median(folded):.2f} / {max(folded):.2f}"
+                line[name] += f" ({left_out:.1f})" if left_out else ""
         table.append(line)
-    return as_text(table, "Triangles turned over or collapsed in the source's disc, in %: median / most")
+    return as_text(table, "Folded triangles with a counterpart, in %: median / most (the most without one)")
 
 
 def targets(rows: list[Row]) -> str:
