@@ -128,7 +128,9 @@ def picture(path: Path, held: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, len(held) + 1, figsize=(3 * len(held) + 3.2, 3.2), layout="constrained")
+    columns = (len(held) + 2) // 2
+    figure, grid = plt.subplots(2, columns, figsize=(3 * columns, 6), layout="constrained", squeeze=False)
+    axes = grid.ravel()
     for ax, (kind, (trust, error, _)) in zip(axes, held.items(), strict=False):
         some = np.random.default_rng(0).permutation(len(trust))[:3000]
         ax.plot(trust[some], 100 * error[some], ".", color="#9fb4c7", markersize=1.5)
@@ -138,13 +140,17 @@ def picture(path: Path, held: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray
             ax.plot((np.arange(BINS) + 0.5) / BINS, 100 * np.array(middle), style, color="#1b4f7d", marker=".")
         ax.axhline(100 * BOUND, color="#b3452c", linewidth=0.8)
         ax.set(title=kind, xlim=(0, 1), ylim=(0.01, 30), yscale="log", xlabel="confidence")
-    axes[0].set_ylabel("error, % of the diagonal")
+    for ax in grid[:, 0]:
+        ax.set_ylabel("error, % of the diagonal")
+    for ax in axes[len(held) + 1 :]:
+        ax.remove()
+    last = axes[len(held)]
     for kind, (trust, error, weight) in held.items():
         said, right, share = calibration(trust, error < BOUND, weight)
-        axes[-1].plot(said[share > 0.005], right[share > 0.005], marker=".", label=kind)
-    axes[-1].plot([0, 1], [0, 1], color="#888888", linewidth=0.8)
-    axes[-1].set(title=f"share below {100 * BOUND:g} %", xlim=(0, 1), ylim=(0, 1.02), xlabel="confidence")
-    axes[-1].legend(fontsize=7)
+        last.plot(said[share > 0.005], right[share > 0.005], marker=".", label=kind)
+    last.plot([0, 1], [0, 1], color="#888888", linewidth=0.8)
+    last.set(title=f"share below {100 * BOUND:g} %", xlim=(0, 1), ylim=(0, 1.02), xlabel="confidence")
+    last.legend(fontsize=7)
     figure.suptitle(
         "Error against confidence, each kind of surface by what the others taught (line: half, dashed: 90 %)"
     )
@@ -155,7 +161,7 @@ def main() -> None:
     """Fit, check and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--sets", default="simpop,ict,teeth,hard-teeth,brain,bent,partial")
+    parser.add_argument("--sets", default="simpop,ict,ict-open,teeth,hard-teeth,brain,bent,partial")
     parser.add_argument("--pairs", type=int)
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()
