@@ -161,7 +161,7 @@ def main() -> None:
     """Fit, check and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--sets", default="simpop,ict,ict-open,teeth,hard-teeth,brain,bent,partial")
+    parser.add_argument("--sets", default="simpop,ict,ict-open,one-open,teeth,hard-teeth,brain,bent,partial")
     parser.add_argument("--pairs", type=int)
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()

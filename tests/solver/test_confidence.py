@@ -39,11 +39,14 @@ def test_it_is_a_probability_that_a_right_map_bears_out(found):
 
 
 def test_a_wrong_map_is_doubted(found):
-    """Turned by a right angle, hills lie on dents."""
+    """The best rival sends everything elsewhere; turned by a right angle, hills lie on dents."""
     _, _, alignment = found
     before = replace(alignment, bending=None)
+    assert before.rival is not None
+    rival = replace(before, mobius=before.rival.mobius, settings=replace(before.settings, take_rival=True))
+    assert confidence(rival).mean() < 0.5 * confidence(before).mean()
     turned = replace(before, mobius=Mobius(0, np.pi / 2) @ alignment.mobius)
-    assert confidence(turned).mean() < 0.75 * confidence(before).mean()
+    assert confidence(turned).mean() < confidence(before).mean() - 0.15
 
 
 def test_surfaces_of_two_kinds_are_doubted_aloud():

@@ -79,7 +79,7 @@ def test_depth_is_measured_along_the_surface():
 
 @pytest.mark.parametrize(
     ("source_cut", "target_cut", "reflected"),
-    [(0.05, 0.0, False), (0.3, 0.0, False), (0.0, 0.3, True), (0.08, 0.08, False)],
+    [(0.05, 0.0, False), (0.3, 0.0, False), (0.0, 0.3, True), (0.15, 0.15, False)],
 )
 def test_where_each_shows_more_than_the_other_the_rest_is_right(source_cut, target_cut, reflected):
     """Each sheet cut at another side: right where both are, unmatched where there is no counterpart, and said."""
@@ -115,6 +115,18 @@ def test_where_each_shows_more_than_the_other_the_rest_is_right(source_cut, targ
     assert ((areas < 0) if reflected else (areas > 0)).all()
     assert np.isfinite(alignment.carried).all()
     assert (np.abs(alignment.carried) <= 1 + 1e-9).all()
+
+
+def test_where_each_lacks_a_third_the_map_is_doubted():
+    """The middle thirds alone show the same: too little for the search, which must not pass for right."""
+    sheet = bumps(2500, seed=1)
+    source, here = cropped(sheet, 0.4, 0.3)
+    target, there = cropped(sheet, 2.9, 0.3)
+    alignment = align(source, posed(target, 2), SMALL)
+    found = correspond(alignment)
+    error = percent(places(found, source), sheet.vertices[there], sheet)
+    assert (error[np.isin(there, here)].mean() < 1) != any(said.startswith("doubtful: ") for said in alignment.warnings)
+    assert (error < 2)[found.matched].mean() > 0.9 or found.matched.mean() < 0.1
 
 
 def test_bent_sheets_may_overlap_in_part():

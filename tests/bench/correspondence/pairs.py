@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -175,7 +175,7 @@ def pair(
         if source_part is not None:
             gap = _distance(shown, truth) / source.mesh.diagonal
             far = good & (gap > CLOSE_TO_EDGE)
-            beyond = Places(face[far], barycentric[far], truth[far])
+            beyond = Places(face[far], barycentric[far], truth[far]) if far.any() else None
             good &= gap < 1e-6
         surface = Places(face[good], barycentric[good], truth[good])
     if source.landmarks is not None and target.landmarks is not None:
@@ -310,6 +310,17 @@ def _partial(store: Store, count: int | None) -> Iterator[Pair]:
         yield pair("partial", target, source, True, 2 * k + 1, store, target_part=cut)
 
 
+def _one_open(store: Store, count: int | None) -> Iterator[Pair]:
+    """Yield pairs of faces of which first the source alone, then the target alone has its mouth and eyes open."""
+    if reason := absent("faces_ict/ict_ground_truth.json"):
+        print(f"one-open skipped: {reason}")
+        return
+    for k, (a, b) in enumerate(ICT[:count]):
+        source, target, part = replace(ict(a), openings=True), replace(ict(b), openings=True), ict_open(a).mesh
+        yield pair("one-open", source, target, True, 2 * k, store, source_part=part)
+        yield pair("one-open", target, source, True, 2 * k + 1, store, target_part=part)
+
+
 def _cut(mesh: TriangleMesh, direction: np.ndarray, share: float) -> TriangleMesh:
     """Return the mesh without the `share` of its area that lies farthest in a direction."""
     height = mesh.vertices[mesh.faces].mean(axis=1) @ direction
@@ -323,6 +334,7 @@ SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
     "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
     "ict-open": _of("ict-open", ICT, ict_open, True, "faces_ict/ict_ground_truth.json"),
+    "one-open": _one_open,
     "teeth": _of("teeth", TEETH, tooth, False, "teeth/landmarks.json"),
     "hard-teeth": _of("hard-teeth", HARD_TEETH, tooth, False, "teeth/landmarks.json"),
     "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
