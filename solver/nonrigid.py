@@ -66,6 +66,14 @@ half around, which must remain possible, and wide enough not to follow the Möbi
 NEAR_BEND_LENGTH = 0.05
 """The same where it starts from a draft, whose errors are a third of the Möbius map's."""
 
+SHARPEST_BEND_LENGTH = BEND_LENGTH / 4
+"""The least width that `BEND_LENGTH` is halved to, while the Möbius map's errors do not account for what averaging does
+away with."""
+
+MOBIUS_ERROR = RIM_REACH
+"""Root of the mean squared distance up to which averaging may move a surface from where the Möbius map puts it: as
+smooth as the error of what is smoothed allows (Morozov's discrepancy principle)."""
+
 POSE_ROUNDS = 10
 """Closest point rounds that improve the pose before anything bends."""
 
@@ -148,7 +156,7 @@ def drafted(
 
     The target is first given the source's pose and coarse bend: an embedding with the lengths of the target whose
     surroundings are turned like their Möbius images (Sorkine and Alexa 2007, with rotations averaged over
-    `BEND_LENGTH`).
+    `BEND_LENGTH`, or less where that would undo a tighter bend: a coil would be flattened).
 
     Parameters
     ----------
@@ -187,7 +195,11 @@ def drafted(
     believed = np.ones(len(nodes)) if trust is None else trust[nodes]
     unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(unbent[nodes], faces)
-    rest = _turned_like(flat, places, believed, BEND_LENGTH if start is None else NEAR_BEND_LENGTH)
+    rest = (
+        _coarsely_bent(flat, places, believed)
+        if start is None
+        else _turned_like(flat, places, believed, NEAR_BEND_LENGTH)
+    )
     tell(0.0)
     rest = _in_pose(TriangleMesh(rest, faces), onto)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
@@ -349,6 +361,18 @@ def _turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: floa
         wanted = weight[:, None] * np.einsum("eij,ej->ei", (turn[i] + turn[j]) / 2, side)
         now = solve(_summed(i, wanted, len(now)) - _summed(j, wanted, len(now)) + areas[:, None] * places)
     return now
+
+
+def _coarsely_bent(flat: TriangleMesh, places: Floats, trust: Floats) -> Floats:
+    """Return the mesh bent like its Möbius image, `places`: as smoothly as the image's errors allow."""
+    weight = flat.vertex_areas * trust
+    length = BEND_LENGTH
+    while True:
+        bent_like = _turned_like(flat, places, trust, length)
+        moved = weight @ ((bent_like - places) ** 2).sum(axis=1) / weight.sum()
+        if moved <= MOBIUS_ERROR**2 or length <= SHARPEST_BEND_LENGTH:
+            return bent_like
+        length /= 2
 
 
 def _summed(index: Integers, values: Floats, count: int) -> Floats:

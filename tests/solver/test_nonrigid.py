@@ -71,6 +71,19 @@ def test_a_rolled_sheet_is_followed(source, angle):
     assert (signed_areas(found.carried, target.mesh.faces) > 0).all()
 
 
+@pytest.mark.parametrize("angle", [np.pi, 4.5])
+def test_a_flat_sheet_is_rolled_up(angle):
+    """Tighter than rotations are averaged over at first."""
+    rolled, flat = bumps(2000, seed=1, bend=angle), bumps(2000, seed=1)
+    source, target = flatten(rolled), flatten(posed(flat, 3))
+    mobius = onto(source.disc, target.disc)
+    found = bent(mobius, source, target)
+    conformal = percent(places(mobius.inverse()(target.disc), source), rolled.vertices, source.mesh)
+    error = percent(places(found.carried, source), rolled.vertices, source.mesh)
+    assert error.mean() < 0.85 * conformal.mean()
+    assert (signed_areas(found.carried, target.mesh.faces) > 0).all()
+
+
 @pytest.mark.parametrize("side", ["source", "target"])
 def test_pose_scale_and_order_do_not_matter(source, side):
     """A similarity of either surface and another order of its vertices: the same map."""
