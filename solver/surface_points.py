@@ -12,6 +12,9 @@ from scipy.spatial import KDTree
 from .locate import face_neighbours
 from .mesh import Booleans, Floats, Integers, TriangleMesh
 
+SUITABLE = 2
+"""Samples around whose faces `SurfacePoints.most_alike` looks."""
+
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
@@ -31,26 +34,35 @@ class SurfacePoints:
     normal_weight: float
 
     @cached_property
-    def _samples(self) -> tuple[Floats, Floats, Integers, Booleans]:
-        """Position, unit normal, a face, and whether on a boundary: of each vertex in use and each face's centre."""
-        faces, vertices = self.mesh.faces, self.mesh.vertices
-        used, first = np.unique(faces.ravel(), return_index=True)
-        normals = self.mesh.vertex_normals()
-        across = normals[faces].sum(axis=1)
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-        rim = np.zeros(len(vertices), bool)
-        rim[np.concatenate(self.loops)] = True
-        return (
-            np.concatenate([vertices[used], vertices[faces].mean(axis=1)]),
-            np.concatenate([normals[used], across]),
-            np.concatenate([first // 3, np.arange(len(faces))]),
-            np.concatenate([rim[used], np.zeros(len(faces), bool)]),
+    def _normals(self) -> Floats:
+        return self.mesh.vertex_normals()
+
+    @cached_property
+    def _features(self) -> Floats:
+        """Position and weighted normal of each vertex, (n, 6)."""
+        return np.hstack([self.mesh.vertices, self.normal_weight * self._normals])
+
+    @cached_property
+    def _tree(self) -> tuple[KDTree, Integers]:
+        """The vertices in use and the faces' centres, with positions and weighted unit normals; a face of each."""
+        features = self._features
+        used, first = np.unique(self.mesh.faces.ravel(), return_index=True)
+        centres = features[self.mesh.faces].mean(axis=1)
+        length = np.linalg.norm(centres[:, 3:], axis=1, keepdims=True)
+        centres[:, 3:] *= self.normal_weight / np.maximum(length, np.finfo(float).tiny)
+        return KDTree(np.concatenate([features[used], centres])), np.concatenate(
+            [first // 3, np.arange(len(self.mesh.faces))]
         )
 
     @cached_property
-    def _tree(self) -> KDTree:
-        positions, normals, _, _ = self._samples
-        return KDTree(np.hstack([positions, self.normal_weight * normals]))
+    def _neighbours(self) -> Integers:
+        return face_neighbours(self.mesh.faces, len(self.mesh.vertices))
+
+    @cached_property
+    def _on_rim(self) -> Booleans:
+        rim = np.zeros(len(self.mesh.vertices), bool)
+        rim[np.concatenate(self.loops)] = True
+        return rim
 
     @cached_property
     def _rim(self) -> tuple[KDTree, Floats, Floats]:
@@ -58,17 +70,7 @@ class SurfacePoints:
         start = self.mesh.vertices[np.concatenate(self.loops)]
         side = self.mesh.vertices[np.concatenate([np.roll(loop, -1) for loop in self.loops])] - start
         points = np.concatenate([start + share * side for share in (0.0, 0.25, 0.5, 0.75)])
-        along = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), np.finfo(float).tiny)
-        return KDTree(points), points, np.tile(along, (4, 1))
-
-    def nearest_sample(self, points: Floats, normals: Floats) -> tuple[Floats, Floats, Booleans]:
-        """Return each query's best sample: position, (q, 3), normal, (q, 3), and whether on a boundary, (q,).
-
-        Samples are the vertices and the faces' centres.
-        """
-        at, across, _, rim = self._samples
-        found = self._tree.query(np.hstack([points, self.normal_weight * normals]), workers=-1)[1]
-        return at[found], across[found], rim[found]
+        return KDTree(points), points, np.tile(_unit(side), (4, 1))
 
     def nearest_on_boundary(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the boundary's nearest point and its unit tangent there, (q, 3) each; to a quarter of an edge."""
@@ -84,20 +86,52 @@ class SurfacePoints:
         """Return the face, (q,), and barycentric coordinates, (q, 3), of the nearest point of the surface.
 
         Looked for in the faces of the samples that suit each query best in position and normal, and next to them.
-        `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
+        Samples are the vertices and the faces' centres. `progress` is called with the share of the work done, in
+        [0, 1], and may raise to end it.
         """
-        _, _, face_of_sample, _ = self._samples
+        near = self._near(points, normals, samples)
+        faces = np.concatenate([near, self._around(near[:, :2])], axis=1)
+        return self._nearest_among(faces, points, self.mesh.vertices, progress)
+
+    def most_alike(self, points: Floats, normals: Floats) -> tuple[Floats, Floats, Booleans]:
+        """Return each query's best point: position, (q, 3), normal, (q, 3), and whether on a boundary, (q,).
+
+        In position and normal together: the coordinates of a space of six dimensions, normals times `normal_weight`.
+        There the surface consists of triangles too, with normals linear in each.
+        """
+        near = self._near(points, normals, SUITABLE)
+        faces = np.concatenate([near, self._around(near[:, :1])], axis=1)
+        query = np.hstack([points, self.normal_weight * normals])
+        face, barycentric = self._nearest_among(faces, query, self._features)
+        corners = self.mesh.faces[face]
+        beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
+        position, normal = (
+            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self._normals)
+        )
+        return position, _unit(normal), beyond
+
+    def _near(self, points: Floats, normals: Floats, samples: int) -> Integers:
+        """Return the faces, (q, samples), of the samples that suit each query best; fewer if there are fewer."""
+        tree, face_of_sample = self._tree
         count = min(samples, len(face_of_sample))
-        found = self._tree.query(np.hstack([points, self.normal_weight * normals]), k=count, workers=-1)[1]
-        near = face_of_sample[np.asarray(found).reshape(len(points), count)]
-        around = face_neighbours(self.mesh.faces, len(self.mesh.vertices))[near[:, :2]].reshape(len(points), -1)
-        face, best = near[:, 0].copy(), np.full(len(points), np.inf)
+        found = tree.query(np.hstack([points, self.normal_weight * normals]), k=count, workers=-1)[1]
+        return face_of_sample[np.asarray(found).reshape(len(points), count)]
+
+    def _around(self, faces: Integers) -> Integers:
+        """Return the faces next to faces, (q, k), as (q, 3 k); beyond a boundary the first again."""
+        around = self._neighbours[faces].reshape(len(faces), -1)
+        return np.where(around < 0, faces[:, :1], around)
+
+    def _nearest_among(
+        self, faces: Integers, points: Floats, places: Floats, progress: Callable[[float], None] | None = None
+    ) -> tuple[Integers, Floats]:
+        """Return which of the faces, (q, k), is nearest to each point, (q, d), and where, with vertices at `places`."""
+        face, best = faces[:, 0].copy(), np.full(len(points), np.inf)
         barycentric = np.zeros((len(points), 3))
-        candidates = np.concatenate([near, np.where(around < 0, near[:, :1], around)], axis=1).T
-        for k, column in enumerate(candidates):
+        for k, column in enumerate(faces.T):
             if progress:
-                progress(k / len(candidates))
-            corners = self.mesh.vertices[self.mesh.faces[column]]
+                progress(k / faces.shape[1])
+            corners = places[self.mesh.faces[column]]
             weights = nearest_in_triangle(points, corners)
             apart = np.einsum("qk,qkd->qd", weights, corners) - points
             distance = _dot(apart, apart)
@@ -107,7 +141,7 @@ class SurfacePoints:
 
 
 def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:
-    """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, 3), nearest to a point, (q, 3)."""
+    """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, d), nearest to a point, (q, d)."""
     b, c, p = (x - corners[:, 0] for x in (corners[:, 1], corners[:, 2], points))
     bb, bc, cc, pb, pc = _dot(b, b), _dot(b, c), _dot(c, c), _dot(p, b), _dot(p, c)
     square = bb * cc - bc**2
@@ -133,5 +167,10 @@ def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    """Return the dot product of each row, (n,), of two (n, 3)."""
+    """Return the dot product of each row, (n,), of two (n, d)."""
     return np.einsum("ij,ij->i", a, b)
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Return the vectors, (n, d), in unit length; zero ones stay."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -104,6 +104,14 @@ def test_pose_scale_and_order_do_not_matter(source, side):
     assert percent(found, expected, source.mesh).mean() < 0.005
 
 
+def test_a_plane_may_slide_along_itself():
+    """Nothing but the Möbius map says where: tangent planes leave three ways of moving open."""
+    mesh = bumps(500, seed=1)
+    level = flatten(TriangleMesh(mesh.vertices * np.array([1, 1, 0]), mesh.faces))
+    found = bent(Mobius(), level, level)
+    assert percent(places(found.carried, level), level.mesh.vertices, level.mesh).max() < 0.1
+
+
 def test_loose_vertices_go_nowhere(source):
     mesh = TriangleMesh(np.vstack([[[9, 9, 9]], source.mesh.vertices]), source.mesh.faces + 1)
     found = bent(Mobius(), source, flatten(mesh))

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from scans import bumps
+from scipy.spatial import KDTree
 
-from solver import flatten
+from solver import TriangleMesh, flatten
 from solver.surface_points import SurfacePoints, nearest_in_triangle
 
 
@@ -43,10 +44,33 @@ def test_points_lifted_off_the_surface_come_back(surface):
 def test_normals_tell_two_sheets_apart():
     """Of two parallel sheets the one that faces the same way is taken, though the other is nearer."""
     flattening = flatten(bumps(200, seed=0))
-    down = SurfacePoints(flattening.mesh, (flattening.boundary,), 10.0)
-    at, normal, _ = down.nearest_sample(np.array([[0.0, 0, 5]]), np.array([[0.0, 0, 1]]))
-    assert normal[0, 2] > 0.95
-    assert at.shape == (1, 3)
+    mesh = flattening.mesh
+    high = mesh.vertices + np.array([0, 0, 0.5])
+    faces = np.vstack([mesh.faces, mesh.faces[:, ::-1] + len(high)])
+    both = SurfacePoints(TriangleMesh(np.vstack([mesh.vertices, high]), faces), (flattening.boundary,), 1.0)
+    above, up = np.array([[0.1, 0.1, 1.0]]), np.array([[0.0, 0, 1]])
+    low_place, low_normal, _ = both.most_alike(above, up)
+    high_place, high_normal, _ = both.most_alike(above, -up)
+    assert high_place[0, 2] - low_place[0, 2] == pytest.approx(0.5, abs=0.1)
+    assert low_normal[0, 2] > 0.9
+    assert high_normal[0, 2] < -0.9
+
+
+def test_the_point_most_alike_is_the_best_of_a_fine_grid(surface):
+    """In position and normal together, to within the grid."""
+    mesh, weight = surface.mesh, surface.normal_weight
+    normals = mesh.vertex_normals()
+    rng = np.random.default_rng(2)
+    steps = np.linspace(0, 1, 15)
+    grid = np.array([(1 - v - w, v, w) for v in steps for w in steps if v + w <= 1 + 1e-12])
+    features = np.hstack([mesh.vertices, weight * normals])
+    everywhere = np.einsum("gk,mkd->mgd", grid, features[mesh.faces]).reshape(-1, 6)
+    query = everywhere[rng.integers(0, len(everywhere), 200)] + 0.02 * rng.normal(size=(200, 6))
+    query[:, 3:] *= weight / np.linalg.norm(query[:, 3:], axis=1, keepdims=True)
+    position, normal, _ = surface.most_alike(query[:, :3], query[:, 3:] / weight)
+    assert np.linalg.norm(normal, axis=1) == pytest.approx(1)
+    apart = np.linalg.norm(np.hstack([position, weight * normal]) - query, axis=1)
+    assert (apart <= KDTree(everywhere).query(query)[0] + 1e-3).mean() > 0.97
 
 
 def test_nearest_on_the_boundary(surface):
@@ -60,9 +84,10 @@ def test_nearest_on_the_boundary(surface):
     )
 
 
-def test_boundary_samples_are_named(surface):
+def test_points_on_a_boundary_are_named(surface):
     mesh, loop = surface.mesh, surface.loops[0]
     normals = mesh.vertex_normals()
-    assert surface.nearest_sample(mesh.vertices[loop], normals[loop])[2].all()
+    outside = mesh.vertices[loop] * np.array([1.2, 1.2, 1])
+    assert surface.most_alike(outside, normals[loop])[2].mean() > 0.95
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), loop)
-    assert not surface.nearest_sample(mesh.vertices[inner], normals[inner])[2].any()
+    assert not surface.most_alike(mesh.vertices[inner], normals[inner])[2].any()

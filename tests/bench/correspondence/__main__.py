@@ -4,8 +4,10 @@
                                          [--pictures]
 
 Run from the repository's root; the data is found as the tests find it. The target of each pair is posed at random and
-decimated to 70 %; every pair runs in both directions. FOLDER, outside the repository, keeps what was computed: each
-result is computed again only when the pair, the method or the solver's code has changed. Methods:
+decimated to 70 %; every pair runs in both directions. In the sets "-moved" its vertices are moved along the surface
+besides, so that it has none in common with the source's template, as two scans have none. FOLDER, outside the
+repository, keeps what was computed: each result is computed again only when the pair, the method or the solver's code
+has changed. Methods:
 
     none, mobius, dense     `align` with its default settings, after each stage
     best-mobius             the Möbius transformation fitted to the truth: the least error of that stage

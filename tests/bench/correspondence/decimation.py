@@ -1,8 +1,8 @@
-"""Fewer triangles: Blender's edge collapse, as a user's second scan or low resolution copy would have it."""
+"""Other triangles: Blender's edge collapse, as a user's low resolution copy would have it, and vertices elsewhere."""
 
 import numpy as np
 
-from solver import TriangleMesh
+from solver import TriangleMesh, topology
 
 
 def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
@@ -28,3 +28,20 @@ def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
     bpy.data.objects.remove(thing)
     bpy.data.meshes.remove(data)
     return TriangleMesh(vertices.reshape(-1, 3).astype(float) / size + middle, faces.reshape(-1, 3), mesh.name)
+
+
+def moved(mesh: TriangleMesh, seed: int) -> TriangleMesh:
+    """Return the mesh with each vertex inside half way to a random point of a triangle around it.
+
+    An edge collapse leaves most vertices where they are. Surfaces of one template then have vertices in common, which
+    tell a method that pairs vertices what it is to find; two scans have none.
+    """
+    rng = np.random.default_rng(seed)
+    side = rng.permutation(mesh.faces.size)
+    around = np.zeros(len(mesh.vertices), np.intp)
+    around[mesh.faces.ravel()[side]] = side // 3
+    share = rng.dirichlet(np.ones(3), len(mesh.vertices))
+    share[np.concatenate(topology(mesh).boundary_loops)] = 0
+    corners = mesh.vertices[mesh.faces[around]]
+    there = mesh.vertices + np.einsum("nk,nkd->nd", share, corners - mesh.vertices[:, None])
+    return TriangleMesh((mesh.vertices + there) / 2, mesh.faces, mesh.name)

@@ -13,7 +13,7 @@ from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import posed
 
 from .bent import bent_pieces, piece
-from .decimation import decimated
+from .decimation import decimated, moved
 from .store import Store, digest
 
 KEPT = 0.7
@@ -149,8 +149,9 @@ def pair(
     *,
     source_part: TriangleMesh | None = None,
     target_part: TriangleMesh | None = None,
+    elsewhere: bool = False,
 ) -> Pair:
-    """Decimate and pose the target and carry the truth along.
+    """Decimate and pose the target and carry the truth along; its vertices are moved `elsewhere` if wanted.
 
     A point of the decimated surface means the nearest one of the surface it was decimated from, and so the point in
     the same place of the same triangle of the source. Of either side a part may be all that is shown.
@@ -161,6 +162,8 @@ def pair(
         lambda: dict(zip(("vertices", "faces"), _arrays(decimated(part, KEPT)), strict=True)),
     )
     small = TriangleMesh(few["vertices"], few["faces"], part.name)
+    if elsewhere:
+        small = moved(small, seed)
     on_whole = surface_points(whole)
     surface = landmarks = beyond = None
     if dense:
@@ -270,14 +273,21 @@ HARD_TEETH = (("x07", "x17"), ("U02", "U08"), ("x02", "x17"), ("x17", "T14"))
 BRAIN = (("left", "right"),)
 
 
-def _of(kind: str, names: tuple[tuple[str, str], ...], shape: Callable[[str], Shape], dense: bool, file: str):
+def _of(
+    kind: str,
+    names: tuple[tuple[str, str], ...],
+    shape: Callable[[str], Shape],
+    dense: bool,
+    file: str,
+    elsewhere: bool = False,
+):
     def made(store: Store, count: int | None) -> Iterator[Pair]:
         if reason := absent(file):
             print(f"{kind} skipped: {reason}")
             return
         for k, (a, b) in enumerate(names[:count]):
-            yield pair(kind, shape(a), shape(b), dense, 2 * k, store)
-            yield pair(kind, shape(b), shape(a), dense, 2 * k + 1, store)
+            yield pair(kind, shape(a), shape(b), dense, 2 * k, store, elsewhere=elsewhere)
+            yield pair(kind, shape(b), shape(a), dense, 2 * k + 1, store, elsewhere=elsewhere)
 
     return made
 
@@ -333,6 +343,8 @@ def _cut(mesh: TriangleMesh, direction: np.ndarray, share: float) -> TriangleMes
 SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
     "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
+    "simpop-moved": _of("simpop-moved", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj", True),
+    "ict-moved": _of("ict-moved", ICT, ict, True, "faces_ict/ict_ground_truth.json", True),
     "ict-open": _of("ict-open", ICT, ict_open, True, "faces_ict/ict_ground_truth.json"),
     "one-open": _one_open,
     "teeth": _of("teeth", TEETH, tooth, False, "teeth/landmarks.json"),

@@ -93,7 +93,7 @@ def targets(rows: list[Row]) -> str:
         "right": _is_right,
         "below meshmonk": lambda all_, own: (
             own.score.mean < all_["meshmonk"].score.mean
-            if own.pair.kind in ("ict", "teeth") and "meshmonk" in all_
+            if own.pair.kind in ("ict", "ict-moved", "teeth") and "meshmonk" in all_
             else None
         ),
         f"at most {SIMPOP_ERROR} %": lambda _, own: (
