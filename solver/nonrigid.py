@@ -51,7 +51,7 @@ NORMAL_WEIGHT = 0.03
 
 SLIP = 0.01
 """Resistance to sliding along a boundary, as a share of that to leaving it. There is none along the surface:
-drawn to vertices, meshes of one template fit better and scans worse (the sets "-moved" of tests/bench/correspondence)."""
+drawn to vertices, meshes of one template fit better and scans worse (the sets "-moved" of tests/bench)."""
 
 OUTLIER = 2.385
 """Cauchy's weight at 95 % efficiency: residuals of this many standard deviations count half."""
