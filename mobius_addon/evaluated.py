@@ -4,37 +4,122 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
-from ..solver import TriangleMesh
-from .mesh_data import Refusal, Surface, foreach, read_surface
+from ..solver import Correspondence, TriangleMesh
+from ..solver.confidence import BOUND
+from ..solver.mesh import Floats
+from ..solver.surface_points import SurfacePoints
+from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface
+
+_TRACE = "mobius_trace"
+"""An attribute that modifiers carry along with the mesh: x, y, z of the original, and 1 to know it from what is new."""
+
+SIDE = 0.01
+"""A difference of 1 between unit normals counts like this share of the root of the area: enough to tell two sides."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """An evaluated mesh.
+
+    Attributes
+    ----------
+    lent : bpy.types.Object
+        An object that has it as its own mesh, with all layers, while the context lasts.
+    surface : Surface
+    origin : (n, 3) float64 or None
+        Where on the original surface each vertex comes from, nan where it is new; None if vertex i is vertex i.
+    """
+
+    lent: bpy.types.Object
+    surface: Surface
+    origin: Floats | None
+
+    def through(self, found: Correspondence, original: Surface) -> Correspondence:
+        """Return a correspondence with the original surface as one with the evaluated one.
+
+        Each target vertex goes to the evaluated triangle that comes from its place on the original. One that comes from
+        farther away than `BOUND` of the diagonal and its own size is no counterpart: a modifier has taken faces away.
+        """
+        if self.origin is None:
+            return found
+        faces = self.surface.mesh.faces
+        kept = np.flatnonzero(np.isfinite(self.origin).all(axis=1)[faces].all(axis=1))
+        traced = TriangleMesh(np.nan_to_num(self.origin), faces[kept], self.surface.mesh.name)
+        located = np.flatnonzero(found.face >= 0)
+        own = original.mesh
+        places = np.einsum("qk,qkd->qd", found.barycentric[located], own.vertices[own.faces[found.face[located]]])
+        normals = own.face_vectors[found.face[located]]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+        surface = SurfacePoints(traced, (), SIDE * np.sqrt(traced.area))
+        there, weights = surface.most_alike(places, normals)
+        reached = np.einsum("qk,qkd->qd", weights, traced.vertices[traced.faces[there]])
+        # coarser triangles lie farther off
+        reach = np.maximum(BOUND * own.diagonal, traced.edge_lengths[there].max(axis=1))
+        near = np.linalg.norm(reached - places, axis=1) < reach
+        face, barycentric = np.full(len(found.face), -1), np.zeros_like(found.barycentric)
+        face[located[near]], barycentric[located[near]] = kept[there[near]], weights[near]
+        return replace(
+            found,
+            face=face,
+            barycentric=barycentric,
+            matched=found.matched & (face >= 0),
+            confidence=np.where(face >= 0, found.confidence, 0.0),
+            source_triangles=faces,
+            source_size=len(self.origin),
+        )
 
 
 @contextmanager
-def evaluated(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """Lend an object that has the evaluated mesh as its own, with all layers; it is gone afterwards.
+def evaluated(obj: bpy.types.Object, original: Surface) -> Iterator[Shown]:
+    """Lend an evaluated object; it is gone afterwards.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    original : Surface
+        Its own mesh, without modifiers.
 
     Raises
     ------
     Refusal
-        Blender does not evaluate the object, or its modifiers change what the mesh is made of.
+        Blender does not evaluate the object, or what its modifiers have made does not tell where it comes from.
     """
     graph = bpy.context.evaluated_depsgraph_get()
     shown = obj.evaluated_get(graph)
     if not shown.is_evaluated:
         raise Refusal(f"'{obj.name}' is hidden, so Blender does not evaluate it: show it, or take the original mesh")
+    with _lent(obj, shown, graph) as lent:
+        if _same_elements(obj.data, lent.data):
+            # in the triangles of the original, which Blender may cut otherwise there
+            vertices = read_surface(lent).mesh.vertices
+            mesh = TriangleMesh(vertices, original.mesh.faces, original.mesh.name)
+            yield Shown(lent, replace(original, mesh=mesh), None)
+            return
+    with _traced(obj) as twin:
+        graph = bpy.context.evaluated_depsgraph_get()
+        with _lent(obj, twin.evaluated_get(graph), graph) as lent:
+            origin = _origin(lent)
+            surface = read_surface(lent, obj.name)
+            if not np.isfinite(origin).all(axis=1)[surface.mesh.faces].all(axis=1).any():
+                names = ", ".join(f"'{modifier.name}'" for modifier in obj.modifiers if modifier.show_viewport)
+                raise Refusal(
+                    f"Modifiers of '{obj.name}' ({names}) make faces that do not tell where they come from: "
+                    "apply them and align again, or take the original mesh"
+                )
+            yield Shown(lent, surface, mirrored(obj, origin))
+
+
+@contextmanager
+def _lent(obj: bpy.types.Object, shown: bpy.types.Object, graph: bpy.types.Depsgraph) -> Iterator[bpy.types.Object]:
+    """Lend an object named like `obj`, with its transform and materials, that has the mesh of an evaluated one."""
     mesh = bpy.data.meshes.new_from_object(shown, preserve_all_data_layers=True, depsgraph=graph)
     lent = bpy.data.objects.new(obj.name, mesh)
     try:
-        if not _same_elements(obj.data, mesh):
-            names = ", ".join(f"'{modifier.name}'" for modifier in obj.modifiers if modifier.show_viewport)
-            raise Refusal(
-                f"Modifiers of '{obj.name}' ({names}) change its faces: apply them and align again, "
-                "or take the original mesh"
-            )
         lent.matrix_world = obj.matrix_world
         for slot, given in zip(lent.material_slots, obj.material_slots, strict=False):
             slot.material = given.material
@@ -45,10 +130,38 @@ def evaluated(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
             bpy.data.meshes.remove(mesh)
 
 
-def evaluated_surface(lent: bpy.types.Object, original: Surface) -> Surface:
-    """Return the surface of a lent object in the triangles of the original, which Blender may cut otherwise there."""
-    vertices = read_surface(lent).mesh.vertices
-    return replace(original, mesh=TriangleMesh(vertices, original.mesh.faces, original.mesh.name))
+@contextmanager
+def _traced(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """Lend a copy of an object, in the scene, whose vertices bear their own positions as an attribute."""
+    twin, mesh = obj.copy(), obj.data.copy()
+    try:
+        twin.data = mesh
+        if _TRACE in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[_TRACE])
+        trace = mesh.attributes.new(_TRACE, "FLOAT_COLOR", "POINT")
+        places = np.ones((len(mesh.vertices), 4), np.float32)
+        places[:, :3] = foreach(mesh.vertices, "co", 3, np.float32)
+        trace.data.foreach_set("color", places.ravel())
+        bpy.context.scene.collection.objects.link(twin)
+        bpy.context.view_layer.update()
+        yield twin
+    finally:
+        bpy.data.objects.remove(twin)
+        bpy.data.meshes.remove(mesh)
+
+
+def _origin(lent: bpy.types.Object) -> Floats:
+    """Return where each vertex comes from, (n, 3), nan where it is new, and take the trace off the lent mesh."""
+    mesh = lent.data
+    trace = mesh.attributes.get(_TRACE)
+    result = np.full((len(mesh.vertices), 3), np.nan)
+    if trace is None or trace.domain != "POINT" or trace.data_type != "FLOAT_COLOR":
+        return result
+    values = foreach(trace.data, "color", 4, np.float32).astype(np.float64)
+    old = np.abs(values[:, 3] - 1) < 1e-3
+    result[old] = values[old, :3]
+    mesh.attributes.remove(trace)
+    return result
 
 
 def _same_elements(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:

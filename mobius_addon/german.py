@@ -163,7 +163,7 @@ GERMAN = {
     "Points": "Punkte",
     "Proven Bound": "Schranke",
     "Quasi-conformal dilatation, the larger over the smaller stretch: dark violet where angles are kept (1), green at 1.7, yellow from 2 on": "Quasikonforme Dilatation, die größere durch die kleinere Streckung: dunkelviolett, wo Winkel erhalten bleiben (1), grün bei 1,7, gelb ab 2",
-    "Read the source as its modifiers and the current mix of its shape keys show it, instead of the original mesh. Modifiers that change its faces are refused": "Die Quelle so lesen, wie Modifikatoren und Shape Keys sie zeigen, statt des ursprünglichen Meshs. Modifikatoren, die Flächen ändern, werden abgelehnt",
+    "Read the source as its modifiers and the current mix of its shape keys show it, instead of the original mesh. Shape keys are the original's": "Die Quelle so lesen, wie Modifikatoren und Shape Keys sie zeigen, statt des ursprünglichen Meshs. Shape Keys sind die des ursprünglichen",
     "Refinement": "Verfeinerung",
     "Refining": "Verfeinern",
     "Remove the copies that Side by Side made and return to the whole scene": "Die Kopien von Nebeneinander entfernen und zur ganzen Szene zurückkehren",

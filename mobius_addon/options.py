@@ -295,7 +295,7 @@ class TransferOptions(SourceMaskOptions):
     evaluated: bpy.props.BoolProperty(
         name="Evaluated Source",
         description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
-        "original mesh. Modifiers that change its faces are refused",
+        "original mesh. Shape keys are the original's",
         default=_TRANSFER.evaluated,
     )
 

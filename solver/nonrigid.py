@@ -410,7 +410,7 @@ def _pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn
     """
     mesh = TriangleMesh(x, faces)
     own = mesh.vertex_normals()
-    point, normal, beyond = onto.most_alike(x, own)
+    point, normal, beyond = onto.at(*onto.most_alike(x, own))
     weight = np.where(beyond, 0.0, np.clip((own * normal).sum(axis=1), 0, 1) ** 2) * areas
     distance = ((point - x) * normal).sum(axis=1)
     deviation = np.sqrt(weight @ distance**2 / max(float(weight.sum()), 1e-12))

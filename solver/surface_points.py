@@ -93,8 +93,8 @@ class SurfacePoints:
         faces = np.concatenate([near, self._around(near[:, :2])], axis=1)
         return self._nearest_among(faces, points, self.mesh.vertices, progress)
 
-    def most_alike(self, points: Floats, normals: Floats) -> tuple[Floats, Floats, Booleans]:
-        """Return each query's best point: position, (q, 3), normal, (q, 3), and whether on a boundary, (q,).
+    def most_alike(self, points: Floats, normals: Floats) -> tuple[Integers, Floats]:
+        """Return the face, (q,), and barycentric coordinates, (q, 3), of the point that suits each query best.
 
         In position and normal together: the coordinates of a space of six dimensions, normals times `normal_weight`.
         There the surface consists of triangles too, with normals linear in each.
@@ -102,7 +102,10 @@ class SurfacePoints:
         near = self._near(points, normals, SUITABLE)
         faces = np.concatenate([near, self._around(near[:, :1])], axis=1)
         query = np.hstack([points, self.normal_weight * normals])
-        face, barycentric = self._nearest_among(faces, query, self._features)
+        return self._nearest_among(faces, query, self._features)
+
+    def at(self, face: Integers, barycentric: Floats) -> tuple[Floats, Floats, Booleans]:
+        """Return points of the surface: position, (q, 3), unit normal, (q, 3), and whether on a boundary, (q,)."""
         corners = self.mesh.faces[face]
         beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
         position, normal = (

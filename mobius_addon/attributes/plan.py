@@ -94,6 +94,7 @@ class Reading:
     warnings: tuple[str, ...]
     names: tuple[str, str]
     unmatched: Unmatched
+    keys_carrier: Carrier
 
     def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
         """Carry every layer.
@@ -132,7 +133,8 @@ class Reading:
 
     def _carried(self, pending: _Pending) -> Carried:
         row, settings = pending.row, self.settings
-        values, covered = row.carry(self.carrier, pending.values)
+        carrier = self.keys_carrier if row.kind == "shape-keys" else self.carrier
+        values, covered = row.carry(carrier, pending.values)
         share = np.ones(len(values))
         if self.influence is not None:
             share = self.carrier.at(row.access.domain, self.influence)
@@ -166,6 +168,7 @@ def read_transfer(
     settings: TransferSettings,
     *,
     shown_source: bpy.types.Object | None = None,
+    keys_carrier: Carrier | None = None,
     influence: Floats | None = None,
     unmatched: Unmatched | None = None,
 ) -> Reading:
@@ -180,6 +183,9 @@ def read_transfer(
     settings : TransferSettings
     shown_source : bpy.types.Object, optional
         The evaluated source, to read layers from; shape keys are the source's own.
+    keys_carrier : Carrier, optional
+        The correspondence with the source's own mesh, for shape keys, if `carrier` is one with an evaluated mesh that
+        has other vertices.
     influence : (n_target,) float, optional
         The target's mask, in [0, 1]; None: 1.
     unmatched : Unmatched, optional
@@ -238,6 +244,7 @@ def read_transfer(
         tuple(warnings),
         (source.name, target.name),
         unmatched or Unmatched.of(carrier),
+        keys_carrier or carrier,
     )
 
 

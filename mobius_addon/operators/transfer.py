@@ -19,7 +19,7 @@ from ..attributes import (
     read_transfer,
     write_transfers,
 )
-from ..evaluated import evaluated, evaluated_surface
+from ..evaluated import evaluated
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
 from ..options import TransferOptions, draw_transfer, transfer_settings
@@ -123,13 +123,29 @@ def read_through(
     Refusal
         As `mask_weights`, `evaluated` and `read_transfer`.
     """
-    with evaluated(source) if settings.evaluated else nullcontext() as shown:
-        seen = surfaces[0] if shown is None else evaluated_surface(shown, surfaces[0])
-        gives = mask_weights(shown or source, settings.source_mask)
-        carrier, unmatched = carrier_between(correspondence, seen, surfaces[1], settings.unmatched, gives)
-        influence = mask_weights(target, settings.target_mask)
+    own_surface, target_surface = surfaces
+    influence = mask_weights(target, settings.target_mask)
+
+    def between(found: Any, surface: Surface, whose: bpy.types.Object) -> Any:
+        gives = mask_weights(whose, settings.source_mask)
+        return carrier_between(found, surface, target_surface, settings.unmatched, gives)
+
+    with evaluated(source, own_surface) if settings.evaluated else nullcontext() as shown:
+        if shown is None:
+            carrier, unmatched = between(correspondence, own_surface, source)
+            return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
+        carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
+        # shape keys are the original's own, which has other vertices then
+        own = None if shown.origin is None else between(correspondence, own_surface, source)[0]
         return read_transfer(
-            source, target, carrier, settings, shown_source=shown, influence=influence, unmatched=unmatched
+            source,
+            target,
+            carrier,
+            settings,
+            shown_source=shown.lent,
+            keys_carrier=own,
+            influence=influence,
+            unmatched=unmatched,
         )
 
 

@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon.attributes import AttributeAccess, VertexGroupAccess  # noqa: E402
 from mobius_extension.mobius_addon.evaluated import evaluated  # noqa: E402
-from mobius_extension.mobius_addon.mesh_data import Refusal  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
 from mobius_extension.mobius_addon.operators.transfer import MOBIUS_OT_transfer  # noqa: E402
 from mobius_extension.solver import Progress  # noqa: E402
 
@@ -89,18 +89,103 @@ def test_an_evaluated_source_has_what_its_modifiers_made(aligned: tuple[Any, Any
     assert contents() == before
 
 
-def test_modifiers_that_change_the_faces_are_refused(aligned: tuple[Any, Any]) -> None:
+def subdivide(source: Any) -> None:
+    source.modifiers.new("Smooth", "SUBSURF").levels = 2
+
+
+def thin_out(source: Any) -> None:
+    source.modifiers.new("Fewer", "DECIMATE").ratio = 0.6
+
+
+def thicken(source: Any) -> None:
+    source.modifiers.new("Thick", "SOLIDIFY").thickness = 0.3
+
+
+def roll(source: Any) -> None:
+    """More faces, and in another place."""
+    source.modifiers.new("Smooth", "SUBSURF").levels = 1
+    bend = source.modifiers.new("Roll", "SIMPLE_DEFORM")
+    bend.deform_method, bend.deform_axis, bend.angle = "BEND", "X", 2.0
+
+
+@pytest.mark.parametrize("change", [subdivide, thin_out, thicken, roll])
+def test_modifiers_may_change_the_faces(aligned: tuple[Any, Any], change: Any) -> None:
+    """What is carried is what the original would give, by way of the faces that the modifiers made of it."""
+    source, target = aligned
+    uv = source.data.uv_layers.new(name="Plan")
+    corners = np.array([source.data.vertices[loop.vertex_index].co[:2] for loop in source.data.loops])
+    uv.uv.foreach_set("vector", corners.astype(np.float32).ravel())
+    before = contents()
+    assert bpy.ops.mobius.transfer() == {"FINISHED"}
+    original = weights(target, "Right"), corner_uvs(target, "Plan")
+    clear_transferred(target)
+    change(source)
+    assert bpy.ops.mobius.transfer(evaluated=True, kinds={"VERTEX_GROUPS", "UV"}) == {"FINISHED"}
+    apart = np.abs(weights(target, "Right") - original[0])
+    assert apart.mean() < 0.01
+    assert apart.max() < 0.1
+    assert np.abs(corner_uvs(target, "Plan") - original[1]).mean() < 0.02
+    assert contents() == before
+    assert "mobius_trace" not in {x.name for x in (*source.data.attributes, *target.data.attributes)}
+
+
+def corner_uvs(obj: Any, name: str) -> np.ndarray:
+    return np.array([x.vector[:] for x in obj.data.uv_layers[name].uv])
+
+
+def clear_transferred(target: Any) -> None:
+    target.vertex_groups.remove(target.vertex_groups["Right"])
+    target.data.uv_layers.remove(target.data.uv_layers["Plan"])
+
+
+def test_what_a_modifier_takes_away_is_no_counterpart(aligned: tuple[Any, Any]) -> None:
+    source, target = aligned
+    add_group(source, "Kept", (positions(source)[:, 0] > 0).astype(float))
+    mask = source.modifiers.new("Half", "MASK")
+    mask.vertex_group = "Kept"
+    assert bpy.ops.mobius.transfer(evaluated=True, unmatched="leave", kinds={"VERTEX_GROUPS"}) == {"FINISHED"}
+    carried, x = weights(target, "Right"), positions(target)[:, 0]
+    assert np.abs(carried - (x + 1) / 2)[x > 0.3].max() < 0.05
+    assert not carried[x < -0.3].any()
+
+
+def test_the_mirrored_half_is_not_taken_for_the_original(aligned: tuple[Any, Any]) -> None:
+    """Its vertices come from the same places, its groups are those of the other side."""
+    source, target = aligned
+    source.vertex_groups["Right"].name = "Hand.R"
+    add_group(source, "Hand.L", np.zeros(len(source.data.vertices)))
+    mirror = source.modifiers.new("Mirror", "MIRROR")
+    mirror.use_mirror_vertex_groups, mirror.use_mirror_merge = True, False
+    assert bpy.ops.mobius.transfer(evaluated=True, kinds={"VERTEX_GROUPS"}) == {"FINISHED"}
+    assert np.abs(weights(target, "Hand.R") - (positions(target)[:, 0] + 1) / 2).max() < 0.05
+
+
+def test_shape_keys_are_the_originals_whatever_the_modifiers_make(aligned: tuple[Any, Any]) -> None:
+    source, target = aligned
+    source.shape_key_add(name="Basis")
+    key = source.shape_key_add(name="Up")
+    key.points.foreach_set("co", (positions(source) + np.array([0, 0, 0.25])).astype(np.float32).ravel())
+    subdivide(source)
+    before = contents()
+    assert bpy.ops.mobius.transfer(evaluated=True, kinds={"SHAPE_KEYS", "VERTEX_GROUPS"}) == {"FINISHED"}
+    moved = np.array([x.co[:] for x in target.data.shape_keys.key_blocks["Up"].points]) - positions(target)
+    assert np.linalg.norm(moved, axis=1) == pytest.approx(0.25, rel=0.2)
+    assert contents()[:3] == before[:3]
+
+
+def test_faces_that_do_not_tell_where_they_come_from_are_refused(aligned: tuple[Any, Any]) -> None:
     source, target = aligned
     before = everything(target), contents()
-    source.modifiers.new("Smooth", "SUBSURF")
-    with pytest.raises(RuntimeError, match=r"Modifiers of 'Source' \('Smooth'\) change its faces: apply them"):
+    source.modifiers.new("Blocks", "REMESH").mode = "BLOCKS"
+    with pytest.raises(RuntimeError, match=r"Modifiers of 'Source' \('Blocks'\) make faces that do not tell where"):
         bpy.ops.mobius.transfer(evaluated=True)
     assert (everything(target), contents()) == before
 
 
 def test_an_object_that_blender_does_not_evaluate_is_refused() -> None:
     loose = bpy.data.objects.new("Loose", make_sheet("Sheet", 4).data)
-    with pytest.raises(Refusal, match="'Loose' is hidden, so Blender does not evaluate it"), evaluated(loose):
+    own = read_surface(loose)
+    with pytest.raises(Refusal, match="'Loose' is hidden, so Blender does not evaluate it"), evaluated(loose, own):
         pass
 
 

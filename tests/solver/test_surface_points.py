@@ -49,8 +49,8 @@ def test_normals_tell_two_sheets_apart():
     faces = np.vstack([mesh.faces, mesh.faces[:, ::-1] + len(high)])
     both = SurfacePoints(TriangleMesh(np.vstack([mesh.vertices, high]), faces), (flattening.boundary,), 1.0)
     above, up = np.array([[0.1, 0.1, 1.0]]), np.array([[0.0, 0, 1]])
-    low_place, low_normal, _ = both.most_alike(above, up)
-    high_place, high_normal, _ = both.most_alike(above, -up)
+    low_place, low_normal, _ = both.at(*both.most_alike(above, up))
+    high_place, high_normal, _ = both.at(*both.most_alike(above, -up))
     assert high_place[0, 2] - low_place[0, 2] == pytest.approx(0.5, abs=0.1)
     assert low_normal[0, 2] > 0.9
     assert high_normal[0, 2] < -0.9
@@ -67,7 +67,7 @@ def test_the_point_most_alike_is_the_best_of_a_fine_grid(surface):
     everywhere = np.einsum("gk,mkd->mgd", grid, features[mesh.faces]).reshape(-1, 6)
     query = everywhere[rng.integers(0, len(everywhere), 200)] + 0.02 * rng.normal(size=(200, 6))
     query[:, 3:] *= weight / np.linalg.norm(query[:, 3:], axis=1, keepdims=True)
-    position, normal, _ = surface.most_alike(query[:, :3], query[:, 3:] / weight)
+    position, normal, _ = surface.at(*surface.most_alike(query[:, :3], query[:, 3:] / weight))
     assert np.linalg.norm(normal, axis=1) == pytest.approx(1)
     apart = np.linalg.norm(np.hstack([position, weight * normal]) - query, axis=1)
     assert (apart <= KDTree(everywhere).query(query)[0] + 1e-3).mean() > 0.97
@@ -88,6 +88,6 @@ def test_points_on_a_boundary_are_named(surface):
     mesh, loop = surface.mesh, surface.loops[0]
     normals = mesh.vertex_normals()
     outside = mesh.vertices[loop] * np.array([1.2, 1.2, 1])
-    assert surface.most_alike(outside, normals[loop])[2].mean() > 0.95
+    assert surface.at(*surface.most_alike(outside, normals[loop]))[2].mean() > 0.95
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), loop)
-    assert not surface.most_alike(mesh.vertices[inner], normals[inner])[2].any()
+    assert not surface.at(*surface.most_alike(mesh.vertices[inner], normals[inner]))[2].any()
