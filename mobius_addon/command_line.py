@@ -147,10 +147,16 @@ def _parser(prog: str) -> argparse.ArgumentParser:
     repair.add_argument("--outer", type=int, metavar="VERTEX", help=_OUTER_HELP)
 
     align = command("align", _align, "Find the certified correspondence between two meshes.")
-    transfer = command("transfer", _transfer, "Carry what is on the source over to the target.")
+    transfer = command(
+        "transfer",
+        _transfer,
+        "Carry what is on the source over to the target, or to each of several. With several, -o, --map and --report "
+        "name folders, for a NAME.blend, NAME.npz and NAME.json of each target; one that cannot be done is named, the "
+        "others are done, and the exit status is 1.",
+    )
     for added in (align, transfer):
         added.add_argument("source", metavar="SOURCE", help=mesh_help)
-        added.add_argument("target", metavar="TARGET", help=mesh_help)
+        added.add_argument("target", metavar="TARGET", nargs="+" if added is transfer else None, help=mesh_help)
         added.add_argument("--map", metavar="MAP.npz", type=Path, help="write the correspondence, array by array")
         added.add_argument("--report", metavar="REPORT.json", type=Path, help="write what was found and proved")
         repair = added.add_argument_group("scans")
@@ -158,7 +164,14 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         repair.add_argument("--source-outer", type=int, metavar="VERTEX", help=f"of the source: {_OUTER_HELP}")
         repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
         _add_align_options(added.add_argument_group("alignment"))
-    transfer.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
+    transfer.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        type=Path,
+        required=True,
+        help="mesh file to write; for several targets a folder",
+    )
     transfer.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     _add_transfer_options(transfer.add_argument_group("transfer"))
     return parser
@@ -390,6 +403,56 @@ def _align(options: argparse.Namespace) -> int:
 
 
 def _transfer(options: argparse.Namespace) -> int:
+    from ..solver import MeshError
+    from .files import Unreadable
+    from .mesh_data import Refusal
+
+    targets = options.target
+    if len(targets) == 1:
+        return _transfer_to(argparse.Namespace(**{**vars(options), "target": targets[0]}))
+    status = DONE
+    for one in _one_by_one(options):
+        try:
+            _transfer_to(one)
+        except (Unreadable, MeshError, Refusal) as error:
+            say_error(f"mobius: {one.target}: {error}")
+            status = NOT_ALIGNED
+    return status
+
+
+def _one_by_one(options: argparse.Namespace) -> list[argparse.Namespace]:
+    """Return the options of a transfer to each of several targets, whose results go into folders.
+
+    Raises
+    ------
+    Unreadable
+        Something is said that can be meant of one target only, or there is no such folder, or two names are the same.
+    """
+    from .files import Unreadable, split_object_name
+
+    for name in ("use_map", "landmarks", "target_outer"):
+        if getattr(options, name) is not None:
+            raise Unreadable(f"--{name.replace('_', '-')} is about one target: give one, not {len(options.target)}")
+    folders = {"output": ".blend", "map": ".npz", "report": ".json"}
+    for name in folders:
+        if (folder := getattr(options, name)) is not None and not folder.is_dir():
+            flag = "-o" if name == "output" else f"--{name}"
+            raise Unreadable(f"{flag} '{folder}' is no folder, which several targets need: make it first")
+    result: list[argparse.Namespace] = []
+    for target in options.target:
+        path, wanted = split_object_name(target)
+        name = path.stem if wanted is None else f"{path.stem} {wanted}"
+        paths = {
+            key: getattr(options, key) and getattr(options, key) / f"{name}{suffix}" for key, suffix in folders.items()
+        }
+        if twin := next((x for x in result if x.output == paths["output"]), None):
+            raise Unreadable(f"'{twin.target}' and '{target}' would both be written to '{twin.output}'")
+        result.append(argparse.Namespace(**{**vars(options), "target": target, **paths}))
+    return result
+
+
+def _transfer_to(options: argparse.Namespace) -> int:
+    """Carry what is on the source over to one target."""
     from dataclasses import asdict
 
     from ..solver import load_map, report, save_map
