@@ -409,7 +409,8 @@ def _transfer(options: argparse.Namespace) -> int:
 
     targets = options.target
     if len(targets) == 1:
-        return _transfer_to(argparse.Namespace(**{**vars(options), "target": targets[0]}))
+        _transfer_to(argparse.Namespace(**{**vars(options), "target": targets[0]}))
+        return DONE
     status = DONE
     for one in _one_by_one(options):
         try:
@@ -433,25 +434,24 @@ def _one_by_one(options: argparse.Namespace) -> list[argparse.Namespace]:
     for name in ("use_map", "landmarks", "target_outer"):
         if getattr(options, name) is not None:
             raise Unreadable(f"--{name.replace('_', '-')} is about one target: give one, not {len(options.target)}")
-    folders = {"output": ".blend", "map": ".npz", "report": ".json"}
-    for name in folders:
-        if (folder := getattr(options, name)) is not None and not folder.is_dir():
+    suffixes = {"output": ".blend", "map": ".npz", "report": ".json"}
+    folders = {name: getattr(options, name) for name in suffixes if getattr(options, name) is not None}
+    for name, folder in folders.items():
+        if not folder.is_dir():
             flag = "-o" if name == "output" else f"--{name}"
             raise Unreadable(f"{flag} '{folder}' is no folder, which several targets need: make it first")
     result: list[argparse.Namespace] = []
     for target in options.target:
         path, wanted = split_object_name(target)
         name = path.stem if wanted is None else f"{path.stem} {wanted}"
-        paths = {
-            key: getattr(options, key) and getattr(options, key) / f"{name}{suffix}" for key, suffix in folders.items()
-        }
+        paths = {key: folder / f"{name}{suffixes[key]}" for key, folder in folders.items()}
         if twin := next((x for x in result if x.output == paths["output"]), None):
             raise Unreadable(f"'{twin.target}' and '{target}' would both be written to '{twin.output}'")
         result.append(argparse.Namespace(**{**vars(options), "target": target, **paths}))
     return result
 
 
-def _transfer_to(options: argparse.Namespace) -> int:
+def _transfer_to(options: argparse.Namespace) -> None:
     """Carry what is on the source over to one target."""
     from dataclasses import asdict
 
@@ -489,7 +489,6 @@ def _transfer_to(options: argparse.Namespace) -> int:
     _warn_of_losses(options.output, plan.counts())
     _warn_of_order(options.map, (source, target))
     say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
-    return DONE
 
 
 def _kinds(only: str | None) -> list[str]:

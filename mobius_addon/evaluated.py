@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
 
 from ..solver import Correspondence, TriangleMesh
 from ..solver.confidence import BOUND
-from ..solver.mesh import Floats
+from ..solver.mesh import Floats, Integers
 from ..solver.surface_points import SurfacePoints
 from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface
 
@@ -39,6 +40,15 @@ class Shown:
     surface: Surface
     origin: Floats | None
 
+    @cached_property
+    def _traced(self) -> tuple[SurfacePoints, Integers]:
+        """The triangles with their vertices where these come from, but for new ones; and which triangles these are."""
+        assert self.origin is not None
+        mesh = self.surface.mesh
+        kept = np.flatnonzero(np.isfinite(self.origin).all(axis=1)[mesh.faces].all(axis=1))
+        traced = TriangleMesh(np.nan_to_num(self.origin), mesh.faces[kept], mesh.name)
+        return SurfacePoints(traced, (), SIDE * np.sqrt(traced.area)), kept
+
     def through(self, found: Correspondence, original: Surface) -> Correspondence:
         """Return a correspondence with the original surface as one with the evaluated one.
 
@@ -47,19 +57,16 @@ class Shown:
         """
         if self.origin is None:
             return found
-        faces = self.surface.mesh.faces
-        kept = np.flatnonzero(np.isfinite(self.origin).all(axis=1)[faces].all(axis=1))
-        traced = TriangleMesh(np.nan_to_num(self.origin), faces[kept], self.surface.mesh.name)
+        traced, kept = self._traced
         located = np.flatnonzero(found.face >= 0)
         own = original.mesh
         places = np.einsum("qk,qkd->qd", found.barycentric[located], own.vertices[own.faces[found.face[located]]])
         normals = own.face_vectors[found.face[located]]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        surface = SurfacePoints(traced, (), SIDE * np.sqrt(traced.area))
-        there, weights = surface.most_alike(places, normals)
-        reached = np.einsum("qk,qkd->qd", weights, traced.vertices[traced.faces[there]])
+        there, weights = traced.most_alike(places, normals)
+        reached = np.einsum("qk,qkd->qd", weights, traced.mesh.vertices[traced.mesh.faces[there]])
         # coarser triangles lie farther off
-        reach = np.maximum(BOUND * own.diagonal, traced.edge_lengths[there].max(axis=1))
+        reach = np.maximum(BOUND * own.diagonal, traced.mesh.edge_lengths[there].max(axis=1))
         near = np.linalg.norm(reached - places, axis=1) < reach
         face, barycentric = np.full(len(found.face), -1), np.zeros_like(found.barycentric)
         face[located[near]], barycentric[located[near]] = kept[there[near]], weights[near]
@@ -69,7 +76,7 @@ class Shown:
             barycentric=barycentric,
             matched=found.matched & (face >= 0),
             confidence=np.where(face >= 0, found.confidence, 0.0),
-            source_triangles=faces,
+            source_triangles=self.surface.mesh.faces,
             source_size=len(self.origin),
         )
 

@@ -71,9 +71,10 @@ class Transfer:
 
 @dataclass(frozen=True, eq=False)
 class _Pending:
-    """A layer that was read: `there` is what the target has under the name, if that matters."""
+    """A layer that was read and who carries it: `there` is what the target has under the name, if that matters."""
 
     row: Row
+    carrier: Carrier
     source_name: str
     name: str
     values: Values
@@ -94,7 +95,6 @@ class Reading:
     warnings: tuple[str, ...]
     names: tuple[str, str]
     unmatched: Unmatched
-    keys_carrier: Carrier
 
     def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
         """Carry every layer.
@@ -133,8 +133,7 @@ class Reading:
 
     def _carried(self, pending: _Pending) -> Carried:
         row, settings = pending.row, self.settings
-        carrier = self.keys_carrier if row.kind == "shape-keys" else self.carrier
-        values, covered = row.carry(carrier, pending.values)
+        values, covered = row.carry(pending.carrier, pending.values)
         share = np.ones(len(values))
         if self.influence is not None:
             share = self.carrier.at(row.access.domain, self.influence)
@@ -202,7 +201,9 @@ def read_transfer(
     for row in ROWS:
         if row.kind not in settings.kinds:
             continue
-        whence = source if shown_source is None or row.kind == "shape-keys" else shown_source
+        whence, way = shown_source or source, carrier
+        if row.kind == "shape-keys":
+            whence, way = source, keys_carrier or carrier
         found: list[_Pending] = []
         for layer in row.access.layers(whence, chosen_layers(row.kind, source, target, settings)):
             taken = {x.name for x in (*pending, *found)}
@@ -213,7 +214,7 @@ def read_transfer(
                 continue
             if name != layer.name and not row.marks and settings.collisions == "replace":
                 warnings.append(f"'{target.name}' has something else named '{layer.name}': it becomes '{name}'")
-            found.append(_Pending(row, layer.name, name, layer.values, None, layer.about))
+            found.append(_Pending(row, way, layer.name, name, layer.values, None, layer.about))
         if row.mixes or row.marks:
             there = row.access.existing(target, [x.name for x in found])
             found = [replace(x, there=there.get(x.name)) for x in found]
@@ -244,7 +245,6 @@ def read_transfer(
         tuple(warnings),
         (source.name, target.name),
         unmatched or Unmatched.of(carrier),
-        keys_carrier or carrier,
     )
 
 

@@ -2,24 +2,27 @@
 
 # no postponed annotations here: Blender reads the properties from them
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...solver import Correspondence
 from .. import stored_alignment
 from ..attributes import (
     KINDS,
+    Carrier,
     Reading,
     Transfer,
     TransferSettings,
+    Unmatched,
     carrier_between,
     mask_weights,
     read_transfer,
     write_transfers,
 )
-from ..evaluated import evaluated
+from ..evaluated import Shown, evaluated
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
 from ..options import TransferOptions, draw_transfer, transfer_settings
@@ -61,10 +64,13 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
             targets = selected_targets(context, source)
         self._targets: list[tuple[str, Surface]] = []
         readings: list[Reading] = []
-        for target in targets:
-            surfaces = read_surface(source), read_surface(target)
-            readings.append(read_pair(source, target, surfaces, settings))
-            self._targets.append((target.name, surfaces[1]))
+        own = read_surface(source)
+        with _seen(source, own, settings) as shown:
+            for target in targets:
+                surfaces = own, read_surface(target)
+                found = stored_alignment.load(target, source, surfaces)
+                readings.append(_read(source, target, surfaces, found, settings, shown))
+                self._targets.append((target.name, surfaces[1]))
 
         def work(report: Report) -> list[Transfer]:
             return [reading.carry(report) for reading in readings]
@@ -96,24 +102,11 @@ def tell(report: Callable[[set[str], str], None], target: str, source: str, plan
     report({"INFO"}, rpt_("'{}' has {} from '{}'{}").format(target, carried, source, plan.unmatched.remark()))
 
 
-def read_pair(
-    source: bpy.types.Object, target: bpy.types.Object, surfaces: tuple[Surface, Surface], settings: TransferSettings
-) -> Reading:
-    """Read a source and a target that keeps an alignment with it.
-
-    Raises
-    ------
-    Refusal
-        As `stored_alignment.load` and `read_through`.
-    """
-    return read_through(source, target, surfaces, stored_alignment.load(target, source, surfaces), settings)
-
-
 def read_through(
     source: bpy.types.Object,
     target: bpy.types.Object,
     surfaces: tuple[Surface, Surface],
-    correspondence: Any,
+    correspondence: Correspondence,
     settings: TransferSettings,
 ) -> Reading:
     """Read a source and a target for a transfer through a correspondence between them.
@@ -123,30 +116,49 @@ def read_through(
     Refusal
         As `mask_weights`, `evaluated` and `read_transfer`.
     """
+    with _seen(source, surfaces[0], settings) as shown:
+        return _read(source, target, surfaces, correspondence, settings, shown)
+
+
+def _seen(
+    source: bpy.types.Object, surface: Surface, settings: TransferSettings
+) -> AbstractContextManager[Shown | None]:
+    """Lend the evaluated source; None if the original is to be read."""
+    return evaluated(source, surface) if settings.evaluated else nullcontext()
+
+
+def _read(
+    source: bpy.types.Object,
+    target: bpy.types.Object,
+    surfaces: tuple[Surface, Surface],
+    correspondence: Correspondence,
+    settings: TransferSettings,
+    shown: Shown | None,
+) -> Reading:
+    """Read a source, or what is shown of it, and a target; see `read_through`."""
     own_surface, target_surface = surfaces
     influence = mask_weights(target, settings.target_mask)
 
-    def between(found: Any, surface: Surface, whose: bpy.types.Object) -> Any:
+    def between(found: Correspondence, surface: Surface, whose: bpy.types.Object) -> tuple[Carrier, Unmatched]:
         gives = mask_weights(whose, settings.source_mask)
         return carrier_between(found, surface, target_surface, settings.unmatched, gives)
 
-    with evaluated(source, own_surface) if settings.evaluated else nullcontext() as shown:
-        if shown is None:
-            carrier, unmatched = between(correspondence, own_surface, source)
-            return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
-        carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
-        # shape keys are the original's own, which has other vertices then
-        own = None if shown.origin is None else between(correspondence, own_surface, source)[0]
-        return read_transfer(
-            source,
-            target,
-            carrier,
-            settings,
-            shown_source=shown.lent,
-            keys_carrier=own,
-            influence=influence,
-            unmatched=unmatched,
-        )
+    if shown is None:
+        carrier, unmatched = between(correspondence, own_surface, source)
+        return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
+    carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
+    # shape keys are the original's own, which has other vertices then
+    own = None if shown.origin is None else between(correspondence, own_surface, source)[0]
+    return read_transfer(
+        source,
+        target,
+        carrier,
+        settings,
+        shown_source=shown.lent,
+        keys_carrier=own,
+        influence=influence,
+        unmatched=unmatched,
+    )
 
 
 def selected_targets(context: bpy.types.Context, source: bpy.types.Object) -> list[bpy.types.Object]:
