@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from .correspond import Correspondence
-from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides, undirected_edges
+from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
 from .surface_points import nearest_in_triangle
 
 _REACH = 4.0
@@ -453,33 +453,48 @@ def local_similarities(
 
     The orthogonal matrix is the one that turns the sides of the triangles around a vertex, and the normal, best from
     the source onto the target (Kabsch 1976); a reflection everywhere if the map mirrors the surface, else nowhere.
-    The scale is the ratio of the lengths of those sides. Both are the identity where nothing is known.
+    The scale is the ratio of the lengths of those sides. Both are the identity where no triangle is known whole.
     """
     face, place = _places(correspondence, source.vertices)
-    edges = undirected_edges(target.faces, len(target.vertices))
-    edges = edges[(face[edges[:, 0]] >= 0) & (face[edges[:, 1]] >= 0)]
-    # components in rows of their own: these are a million numbers each
-    there, here = ((x[edges[:, 1]] - x[edges[:, 0]]).T.copy() for x in (place, target.vertices))
-    size = len(face)
-    gather = csr_array(
-        (np.ones(2 * len(edges)), (edges.ravel(), np.repeat(np.arange(len(edges)), 2))), shape=(size, len(edges))
+    triangles = target.faces[(face[target.faces] >= 0).all(axis=1)]
+    size, count = len(face), len(triangles)
+    corners = csr_array(
+        (np.ones(3 * count), triangles.ravel().astype(np.int32), np.arange(0, 3 * count + 1, 3, dtype=np.int32)),
+        shape=(count, size),
     )
-    there_square, here_square = (gather @ (x**2).sum(axis=0) for x in (there, here))
+    sums = corners.T @ _over_sides(np.hstack([place, target.vertices]), triangles)
+    there_square, here_square, products = sums[:, 0], sums[:, 1], sums[:, 2:].reshape(-1, 3, 3)
     there_normal = interpolate(correspondence, source.vertex_normals())
     there_normal /= np.maximum(np.linalg.norm(there_normal, axis=1, keepdims=True), 1e-300)
     here_normal = target.vertex_normals()
     known = (there_square > 0) & (here_square > 0)
-    weight = np.sqrt(there_square * here_square)[known]
-    product = np.empty((3, 3, len(weight)))
-    for a in range(3):
-        for b in range(3):
-            sums = (gather @ (here[a] * there[b]))[known]
-            product[a, b] = sums / weight + here_normal[known, a] * there_normal[known, b]
+    weight = np.sqrt(there_square * here_square)[known, None, None]
+    normals = here_normal[known, :, None] * there_normal[known, None]
     rotation = np.broadcast_to(np.eye(3), (size, 3, 3)).copy()
-    rotation[known] = nearest_orthogonal(product.transpose(2, 0, 1))
+    rotation[known] = nearest_orthogonal(products[known] / weight + normals)
     scale = np.ones(size)
     scale[known] = np.sqrt(here_square[known] / there_square[known])
     return rotation, scale
+
+
+def _over_sides(points: Floats, triangles: Integers) -> Floats:
+    """Return sums over the three sides of each triangle, (m, 11), for two places of each point, (n, 6).
+
+    Of each place's squared length, and the products of the components, (3, 3), of the second place by the first.
+    """
+    result = np.empty((len(triangles), 11))
+    for first in range(0, len(triangles), _PIECE):
+        piece = slice(first, first + _PIECE)
+        corner = points[triangles[piece]].transpose(1, 2, 0).copy()
+        u, v = corner[1] - corner[0], corner[2] - corner[0]
+        p, q = 2 * u - v, 2 * v - u
+        square = u * p + v * q
+        result[piece, 0] = square[0] + square[1] + square[2]
+        result[piece, 1] = square[3] + square[4] + square[5]
+        for a in range(3):
+            for b in range(3):
+                result[piece, 2 + 3 * a + b] = u[3 + a] * p[b] + v[3 + a] * q[b]
+    return result
 
 
 def nearest_orthogonal(matrices: Floats) -> Floats:

@@ -160,11 +160,6 @@ def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Intege
     return np.stack(np.divmod(edges, vertex_count), axis=1), edge_of_side.reshape(-1)
 
 
-def undirected_edges(faces: Integers, vertex_count: int) -> Integers:
-    """Return the edges of `edges_of_sides` alone, which takes a fraction of the time."""
-    return np.stack(np.divmod(np.unique(_edge_keys(faces, vertex_count)), vertex_count), axis=1)
-
-
 def _edge_keys(faces: Integers, vertex_count: int) -> Integers:
     start, stop = directed_edges(faces).T
     return np.minimum(start, stop) * vertex_count + np.maximum(start, stop)
