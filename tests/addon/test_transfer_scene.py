@@ -108,18 +108,33 @@ def roll(source: Any) -> None:
     bend.deform_method, bend.deform_axis, bend.angle = "BEND", "X", 2.0
 
 
-@pytest.mark.parametrize("change", [subdivide, thin_out, thicken, roll])
+def join_a_cube(source: Any) -> None:
+    """Geometry nodes that subdivide what they are given, and put a cube of their own beside it."""
+    nodes = bpy.data.node_groups.new("Cube", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    kinds = ("NodeGroupInput", "GeometryNodeSubdivideMesh", "GeometryNodeMeshCube")
+    given, finer, cube = (nodes.nodes.new(kind) for kind in kinds)
+    joined, made = nodes.nodes.new("GeometryNodeJoinGeometry"), nodes.nodes.new("NodeGroupOutput")
+    nodes.links.new(given.outputs[0], finer.inputs[0])
+    for part in (finer, cube):
+        nodes.links.new(part.outputs[0], joined.inputs[0])
+    nodes.links.new(joined.outputs[0], made.inputs[0])
+    source.modifiers.new("Cube", "NODES").node_group = nodes
+
+
+@pytest.mark.parametrize("change", [subdivide, thin_out, thicken, roll, join_a_cube])
 def test_modifiers_may_change_the_faces(aligned: tuple[Any, Any], change: Any) -> None:
     """What is carried is what the original would give, by way of the faces that the modifiers made of it."""
     source, target = aligned
     uv = source.data.uv_layers.new(name="Plan")
     corners = np.array([source.data.vertices[loop.vertex_index].co[:2] for loop in source.data.loops])
     uv.uv.foreach_set("vector", corners.astype(np.float32).ravel())
-    before = contents()
     assert bpy.ops.mobius.transfer() == {"FINISHED"}
     original = weights(target, "Right"), corner_uvs(target, "Plan")
     clear_transferred(target)
     change(source)
+    before = contents()
     assert bpy.ops.mobius.transfer(evaluated=True, kinds={"VERTEX_GROUPS", "UV"}) == {"FINISHED"}
     apart = np.abs(weights(target, "Right") - original[0])
     assert apart.mean() < 0.01
@@ -136,6 +151,11 @@ def corner_uvs(obj: Any, name: str) -> np.ndarray:
 def clear_transferred(target: Any) -> None:
     target.vertex_groups.remove(target.vertex_groups["Right"])
     target.data.uv_layers.remove(target.data.uv_layers["Plan"])
+
+
+def test_one_undo_takes_back_a_transfer_from_other_faces(aligned: tuple[Any, Any]) -> None:
+    subdivide(aligned[0])
+    undone_by_one_step(["Source", "Target"], lambda *how: bpy.ops.mobius.transfer(*how, evaluated=True))
 
 
 def test_what_a_modifier_takes_away_is_no_counterpart(aligned: tuple[Any, Any]) -> None:
@@ -232,6 +252,7 @@ def test_edit_mode_is_refused_with_the_reason(aligned: tuple[Any, Any]) -> None:
 
 
 def test_a_linked_target_is_refused_and_a_linked_source_gives(aligned: tuple[Any, Any], tmp_path: Any) -> None:
+    subdivide(aligned[0])
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -248,8 +269,12 @@ def test_a_linked_target_is_refused_and_a_linked_source_gives(aligned: tuple[Any
     bpy.context.scene.collection.objects.link(local)
     local.data = target.data.copy()
     mobius.target = local
-    assert bpy.ops.mobius.transfer() == {"FINISHED"}
-    assert np.abs(weights(local, "Right") - (positions(local)[:, 0] + 1) / 2).max() < 0.05
+    before = contents()
+    for evaluated_source in (False, True):
+        assert bpy.ops.mobius.transfer(evaluated=evaluated_source) == {"FINISHED"}
+        assert np.abs(weights(local, "Right") - (positions(local)[:, 0] + 1) / 2).max() < 0.05
+        local.vertex_groups.clear()
+    assert contents() == before
 
 
 # select unmatched
@@ -321,12 +346,14 @@ class Operator:
             setattr(self, name, choices.get(name, getattr(bpy.context.scene.mobius, name)))
 
 
-def test_a_cancelled_transfer_changes_nothing(aligned: tuple[Any, Any]) -> None:
+@pytest.mark.parametrize("from_modifiers", [False, True])
+def test_a_cancelled_transfer_changes_nothing(aligned: tuple[Any, Any], from_modifiers: bool) -> None:
     from mobius_extension.solver import Cancelled
 
-    _, target = aligned
+    source, target = aligned
+    subdivide(source)
     before = everything(target), contents()
-    operator: Any = Operator()
+    operator: Any = Operator(evaluated=from_modifiers)
     work = MOBIUS_OT_transfer.prepare(operator, bpy.context)
     steps: list[Progress] = []
 
