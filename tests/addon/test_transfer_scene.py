@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon.attributes import AttributeAccess, VertexGroupAccess  # noqa: E402
 from mobius_extension.mobius_addon.evaluated import evaluated  # noqa: E402
-from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import Refusal, foreach, read_surface  # noqa: E402
 from mobius_extension.mobius_addon.operators.transfer import MOBIUS_OT_transfer  # noqa: E402
 from mobius_extension.solver import Progress  # noqa: E402
 
@@ -135,7 +135,9 @@ def test_modifiers_may_change_the_faces(aligned: tuple[Any, Any], change: Any) -
     clear_transferred(target)
     change(source)
     before = contents()
-    assert bpy.ops.mobius.transfer(evaluated=True, kinds={"VERTEX_GROUPS", "UV"}) == {"FINISHED"}
+    assert bpy.ops.mobius.transfer(evaluated=True, kinds={"VERTEX_GROUPS", "UV", "ATTRIBUTES"}) == {"FINISHED"}
+    if change is join_a_cube and bpy.app.version < (4, 5):  # where joining makes attributes of vertex groups
+        add_group(target, "Right", foreach(target.data.attributes["Right"].data, "value", 1, np.float32))
     apart = np.abs(weights(target, "Right") - original[0])
     assert apart.mean() < 0.01
     assert apart.max() < 0.1
