@@ -20,7 +20,7 @@ from .landmarks import usable_landmarks, with_landmarks
 from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh
 from .mobius import Mobius, hyperbolic_distance
 from .nonrigid import ROUNDS, Draft, drafted, finished
-from .objective import Objective, compatibility, covering_radius, interior, source_points, usual_difference
+from .objective import Objective, compatibility, covering_radius, interior, source_points
 from .overlap import Piece, piece, shared
 from .refine import refined
 from .rival import ELSEWHERE, Rival, best_rival
@@ -42,6 +42,9 @@ SETTLED = 0.005
 
 DOUBTFUL = 0.5
 """Mean confidence up to which the whole map is doubted aloud."""
+
+HYPOTHESES = 3
+"""Further maxima of the search at most that are bent too where the best one's map is doubtful."""
 
 DRAFTS = 4
 """Drafts at most until the overlap is settled."""
@@ -82,16 +85,78 @@ def align(
     """
     settings = settings or AlignSettings()
     clock = Stages(progress)
-    found = _matched(source_mesh, target_mesh, settings, clock.part(0, 0.7), landmarks)
+    found = matched = _matched(source_mesh, target_mesh, settings, clock.part(0, 0.7), landmarks)
     if settings.refine == "dense":
-        found = _bent(found, clock.part(0.7, 1), landmarks)
+        found = _bent(matched, clock.part(0.7, 0.95), landmarks)
+        if not settings.take_rival and not np.size([] if landmarks is None else landmarks):  # these decide
+            found = _reconsidered(found, matched, clock.part(0.95, 1))
     clock.end()
     found = replace(found, seconds=clock.seconds)
-    areas = target_mesh.vertex_areas * (found.confidence > 0)
-    if found.confidence @ areas <= DOUBTFUL * areas.sum():
+    if _doubtful(found):
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         found = replace(found, warnings=(*found.warnings, said))
     return found
+
+
+def _doubtful(found: Alignment) -> bool:
+    """Return whether the map is more likely wrong than right, where it claims anything."""
+    areas = found.target.mesh.vertex_areas * (found.confidence > 0)
+    return bool(found.confidence @ areas <= DOUBTFUL * areas.sum())
+
+
+def _reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignment:
+    """Return what another maximum of the search leads to, where the best is doubtful, or mirrored without need.
+
+    A hundred samples may prefer a wrong map, as where both scans lack a part, or where one lacks the left and one the
+    right of something symmetric. All vertices, once bent, tell whether another fits.
+
+    Parameters
+    ----------
+    found, matched : Alignment
+        What the search's best led to, and this before it was bent.
+    """
+
+    def sure(alignment: Alignment) -> float:
+        return float(alignment.confidence @ alignment.target.mesh.vertex_areas)
+
+    if matched.other is not None and matched.margin is not None and matched.mobius.reflected:
+        upright = replace(matched, search=matched.other, other=matched.search, rival=None)
+        other = _fitting(upright, clock.part(0.0, 0.5, "reconsider"), best=True)
+        if other is not None and sure(other) > DOUBTFUL * sure(found):
+            said = (
+                f"ambiguous orientation: mirrored scores {100 * matched.margin:.1f} % of the samples more, but not "
+                "mirrored fits too; taken as not mirrored"
+            )
+            return replace(other, warnings=(said, *other.warnings))
+        if found.overlap is not None:
+            said = (
+                "ambiguous orientation: what the surfaces have in common matches only mirrored; if they show something "
+                "symmetric, these are opposite sides of it"
+            )
+            found = replace(found, warnings=(*found.warnings, said))
+    if _doubtful(found):
+        other = _fitting(matched, clock.part(0.5, 1.0, "reconsider"), best=False)
+        if other is not None and other.taken is not None and sure(other) > sure(found):
+            behind = 100 * (matched.search.value - other.taken.value) / len(matched.source_samples)
+            said = f"reconsidered: the best map does not fit; one that scores {behind:.1f} % of the samples less does"
+            return replace(other, warnings=(said, *other.warnings))
+    return found
+
+
+def _fitting(matched: Alignment, clock: Part, *, best: bool) -> Alignment | None:
+    """Return what the first of the search's maxima leads to that is not doubtful; `best`: it may be the best itself."""
+    known: list[Mobius] = []
+    for number in range(HYPOTHESES + 1):
+        part = clock.part(number / (HYPOTHESES + 1), (number + 1) / (HYPOTHESES + 1))
+        part.begin("reconsider", "Trying the next best map", 0.0)
+        rival = _rival(matched, known, None, part) if known else None
+        known.append((rival or matched.search).mobius)
+        if rival is None and not best:
+            continue
+        found = _bent(_taking(matched, rival, part.within(0.2, 0.4)), part.part(0.4, 1.0), None)
+        if not _doubtful(found):
+            return found
+    return None
 
 
 def _matched(
@@ -130,35 +195,13 @@ def _matched(
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
         target_samples = np.concatenate([target_samples, pairs[:, 1]])
         problem = Objective(source.disc[source_samples], target.disc[target_samples], radius, weights)
-    found, margin, said = _searched(problem, settings, clock)
+    found, other, said = _searched(problem, settings, clock)
     warnings += said
-    rival = _rival(problem, found, settings, clock)
-    if rival.value >= found.value - settings.reflect_margin * len(source_samples):
-        warnings.append(
-            f"ambiguous: a map that sends everything elsewhere scores within "
-            f"{100 * max(found.value - rival.value, 0) / len(source_samples):.1f} % of the samples of the best; is the "
-            "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
-        )
-    mobius = rival.mobius if settings.take_rival else found.mobius
-    difference = usual_difference(
-        source_descriptors[source_samples[found.matches[:, 0]]], target_descriptors[target_samples[found.matches[:, 1]]]
-    )
-    if settings.refine != "none":
-        clock.begin("refine", "Refining", 0.9)
-        mobius = refined(
-            mobius,
-            source,
-            target,
-            source_descriptors,
-            target_descriptors,
-            difference,
-            clock.within(0.9, 1.0),
-        )
     if not found.certified:
         share = 100 * found.gap / max(found.upper_bound, 1e-300)
         warnings.append(f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given")
-    return Alignment(
-        mobius=mobius,
+    alignment = Alignment(
+        mobius=found.mobius,
         search=found,
         source=source,
         target=target,
@@ -166,12 +209,47 @@ def _matched(
         target_samples=target_samples,
         source_descriptors=source_descriptors,
         target_descriptors=target_descriptors,
-        difference=difference,
+        objective=problem,
         settings=settings,
-        margin=margin,
-        rival=rival,
-        warnings=tuple(warnings),
+        other=other,
     )
+    clock.begin("rival", "Looking for a rival", 0.75)
+    near = settings.reflect_margin * len(source_samples)
+    rival = _rival(alignment, [found.mobius], found.value - near, clock)
+    if rival.value >= found.value - near:
+        warnings.append(
+            f"ambiguous: a map that sends everything elsewhere scores within "
+            f"{100 * max(found.value - rival.value, 0) / len(source_samples):.1f} % of the samples of the best; is the "
+            "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
+        )
+    alignment = replace(alignment, rival=rival, warnings=tuple(warnings))
+    clock.begin("refine", "Refining", 0.9)
+    return _taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
+
+
+def _rival(found: Alignment, known: list[Mobius], enough: float | None, clock: Part) -> Rival:
+    """Look for the best transformation that maps everything elsewhere than those known."""
+    rival = best_rival(
+        found.objective,
+        known,
+        z_max=found.settings.z_max,
+        enough=enough,
+        time_limit=found.settings.time_limit,
+        progress=clock.searching(0.15),
+    )
+    if rival is None:
+        raise Cancelled
+    return rival
+
+
+def _taking(found: Alignment, rival: Rival | None, tell: Callable[[float], None]) -> Alignment:
+    """Go on with a rival, or with the best if that is None: refine it on all vertices."""
+    found = replace(found, taken=rival, mobius=(rival or found.search).mobius)
+    if found.settings.refine == "none":
+        return found
+    descriptors = found.source_descriptors, found.target_descriptors
+    mobius = refined(found.mobius, found.source, found.target, *descriptors, found.difference, tell)
+    return replace(found, mobius=mobius)
 
 
 def _bent(found: Alignment, clock: Part, landmarks: npt.ArrayLike | None) -> Alignment:
@@ -263,7 +341,7 @@ def _overlap(
         inner = _matched(source_part.mesh, target_part.mesh, settings, clock.part(0.2, 0.5, "overlap"), pairs)
     except MeshError:  # too small a piece to flatten
         return None
-    if not _surely_better(_matches(inner), _matches(found)):
+    if not _surely_better(inner.matched_weights, found.matched_weights):
         return None
     used = np.flatnonzero(np.isfinite(found.target.disc.real))
     places = draft.places(found.target)
@@ -287,18 +365,6 @@ def _overlap(
     )
     inner = replace(inner, bending=bending, counterpart=there)
     return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
-
-
-def _matches(found: Alignment) -> Floats:
-    """Return the weight, (N1,), with which each source sample matched in the search; 0 where it did not."""
-    rows, columns = found.search.matches.T
-    weights = np.zeros(len(found.source_samples))
-    weights[rows] = compatibility(
-        found.source_descriptors[found.source_samples],
-        found.target_descriptors[found.target_samples],
-        found.settings.compatible,
-    )[rows, columns]
-    return weights
 
 
 def _surely_better(parts: Floats, whole: Floats) -> bool:
@@ -361,8 +427,10 @@ def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Boo
     return ~target_cut & ~source_cut[nearest]
 
 
-def _searched(problem: Objective, settings: AlignSettings, clock: Part) -> tuple[SearchResult, float | None, list[str]]:
-    """Search the orientations that the settings ask for; return the one to take, its margin, and warnings."""
+def _searched(
+    problem: Objective, settings: AlignSettings, clock: Part
+) -> tuple[SearchResult, SearchResult | None, list[str]]:
+    """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
@@ -394,26 +462,7 @@ def _searched(problem: Objective, settings: AlignSettings, clock: Part) -> tuple
             f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
             "taken as not mirrored"
         )
-    return results[chosen], advantage if chosen else -advantage, warnings
-
-
-def _rival(problem: Objective, winner: SearchResult, settings: AlignSettings, clock: Part) -> Rival:
-    """Look for a transformation that is as good as the winner and maps everything elsewhere."""
-    clock.begin("rival", "Looking for a rival", 0.75)
-    rival = best_rival(
-        problem.source,
-        problem.target,
-        problem.radius,
-        problem.weights,
-        winner,
-        z_max=settings.z_max,
-        close=settings.reflect_margin * len(problem.source),
-        time_limit=settings.time_limit,
-        progress=clock.searching(0.15),
-    )
-    if rival is None:
-        raise Cancelled
-    return rival
+    return results[chosen], results[not chosen], warnings
 
 
 def _mirrored(result: SearchResult) -> SearchResult:

@@ -13,6 +13,7 @@ from .locate import TriangulatedDisc
 from .mesh import Booleans, Complexes, Floats, Integers
 from .mobius import Mobius
 from .nonrigid import Bending
+from .objective import Objective, usual_difference
 from .overlap import Piece
 from .rival import Rival
 from .search import SearchResult
@@ -97,8 +98,8 @@ class Alignment:
         Vertices that stood for the surfaces in the search; `search.matches` index into these.
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of all vertices.
-    difference : float
-        By how much descriptors of points that belong together differ, from the search's matches.
+    objective : Objective
+        What was searched: the samples in the discs, match discs and weights.
     settings : AlignSettings
     bending : Bending or None
         Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not, or not
@@ -107,10 +108,12 @@ class Alignment:
         The parts that both surfaces show, aligned by themselves; None if that is all of them, or was not asked.
     counterpart : (n_target,) bool or None
         Which target vertices have a counterpart on the source: those not beyond its boundary; None if it was not asked.
-    margin : float or None
-        By how much of the samples the chosen orientation beat the other; None if only one was searched.
+    other : SearchResult or None
+        The search in the other orientation; None if only one was searched.
     rival : Rival or None
         The best transformation that maps everything elsewhere; None if it was not searched for.
+    taken : Rival or None
+        Which rival was gone on with in place of the search's best; None: the best.
     seconds : dict of str to float
         Wall-clock time per stage.
     warnings : tuple of str
@@ -125,15 +128,21 @@ class Alignment:
     target_samples: Integers
     source_descriptors: Floats
     target_descriptors: Floats
-    difference: float
+    objective: Objective
     settings: AlignSettings
     bending: Bending | None = None
     overlap: Overlap | None = None
     counterpart: Booleans | None = None
-    margin: float | None = None
+    other: SearchResult | None = None
     rival: Rival | None = None
+    taken: Rival | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def margin(self) -> float | None:
+        """By how much of the samples the chosen orientation beat the other; None if only one was searched."""
+        return None if self.other is None else (self.search.value - self.other.value) / len(self.source_samples)
 
     @property
     def rival_margin(self) -> float | None:
@@ -141,6 +150,22 @@ class Alignment:
         if self.rival is None:
             return None
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
+
+    @cached_property
+    def matched_weights(self) -> Floats:
+        """The weight, (N1,), with which each source sample matched under the map that was taken; 0 where it did not."""
+        rows, columns = (self.taken or self.search).matches.T
+        result = np.zeros(len(self.source_samples))
+        result[rows] = self.objective.weights[rows, columns]
+        return result
+
+    @cached_property
+    def difference(self) -> float:
+        """By how much descriptors of points that belong together differ, from the samples that matched."""
+        rows, columns = (self.taken or self.search).matches.T
+        return usual_difference(
+            self.source_descriptors[self.source_samples[rows]], self.target_descriptors[self.target_samples[columns]]
+        )
 
     @cached_property
     def carried(self) -> Complexes:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .matching import matching
-from .mesh import Complexes, Floats
+from .mesh import Integers
 from .mobius import Mobius, hyperbolic_distance
-from .search import SearchProgress, SearchResult, search
+from .objective import Objective
+from .search import SearchProgress, search
 
 ELSEWHERE = 0.6
 """Pseudo-hyperbolic distance beyond which a point counts as sent elsewhere: half of the disc's radius seen from its
@@ -29,57 +30,62 @@ class Rival:
         Its Q, on the same scale as the winner's.
     upper_bound : float
         No transformation that sends every point elsewhere has a larger Q.
+    matches : (k, 2) int
+        As `SearchResult.matches`.
     """
 
     mobius: Mobius
     value: float
     upper_bound: float
+    matches: Integers
 
 
 def best_rival(
-    source: Complexes,
-    target: Complexes,
-    radius: Floats | float,
-    weights: Floats,
-    winner: SearchResult,
+    objective: Objective,
+    known: Sequence[Mobius],
     *,
     z_max: float,
-    close: float,
+    enough: float | None = None,
     time_limit: float | None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
 ) -> Rival | None:
-    """Search again without the pairs that the winner brings near each other; None if cancelled.
-
-    The search ends as soon as it is decided whether a rival is as good as the winner to within `close`.
+    """Search again without the pairs that known transformations bring near each other; None if cancelled.
 
     Parameters
     ----------
-    source, target, radius, weights, z_max, time_limit, progress :
-        As for `search`, of the search that `winner` came from; `winner.mobius` may be reflected.
-    close : float
-        Difference of Q below which the two are not told apart.
+    objective : Objective
+    known : sequence of Mobius
+        All reflected, or none: the winner of a search, and rivals found before.
+    z_max, time_limit, progress :
+        As for `search`.
+    enough : float, optional
+        The search ends as soon as it is decided whether a rival has this Q.
     """
-    reflected = winner.mobius.reflected
-    seen = np.conj(source) if reflected else source
-    elsewhere = hyperbolic_distance(winner.mobius(source)[:, None], target) > ELSEWHERE
+    reflected = known[0].reflected
+    seen = np.conj(objective.source) if reflected else objective.source
+    elsewhere = np.ones(objective.weights.shape, bool)
+    for mobius in known:
+        elsewhere &= hyperbolic_distance(mobius(objective.source)[:, None], objective.target) > ELSEWHERE
     stopped = False
 
     def decided(state: SearchProgress) -> bool | None:
         nonlocal stopped
         stopped = progress is not None and progress(state) is False
-        enough = winner.value - close
-        return False if stopped or state.upper_bound < enough or state.value >= enough else None
+        settled = enough is not None and (state.upper_bound < enough or state.value >= enough)
+        return False if stopped or settled else None
 
     found = search(
         seen,
-        target,
-        radius,
-        weights=np.where(elsewhere, weights, 0.0),
+        objective.target,
+        objective.radius,
+        weights=np.where(elsewhere, objective.weights, 0.0),
         z_max=z_max,
         time_limit=time_limit,
         progress=decided,
     )
     if stopped:
         return None
-    value = matching(seen, target, radius, weights=weights).value(found.mobius)
-    return Rival(replace(found.mobius, reflected=reflected), value, max(found.upper_bound, value))
+    whole = matching(seen, objective.target, objective.radius, weights=objective.weights)
+    value = whole.value(found.mobius)
+    mobius = replace(found.mobius, reflected=reflected)
+    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius))

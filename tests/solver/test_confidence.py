@@ -43,7 +43,7 @@ def test_a_wrong_map_is_doubted(found):
     _, _, alignment = found
     before = replace(alignment, bending=None)
     assert before.rival is not None
-    rival = replace(before, mobius=before.rival.mobius, settings=replace(before.settings, take_rival=True))
+    rival = replace(before, mobius=before.rival.mobius, taken=before.rival)
     assert confidence(rival).mean() < 0.5 * confidence(before).mean()
     turned = replace(before, mobius=Mobius(0, np.pi / 2) @ alignment.mobius)
     assert confidence(turned).mean() < confidence(before).mean() - 0.15
