@@ -120,6 +120,7 @@ GERMAN = {
     "Limit Groups": "Gruppen begrenzen",
     "Longest": "Längster",
     "Looking for a rival": "Rivalen suchen",
+    "Trying the next best map": "Nächstbeste Abbildung versuchen",
     "Make the source the target and the target the source": "Die Quelle zum Ziel machen und das Ziel zur Quelle",
     "Match Radius": "Trefferradius",
     "Match source and target: both get a shared UV map, corresponding colors and a group of matched points": "Quelle und Ziel einander zuordnen: Beide bekommen eine gemeinsame UV-Map, einander entsprechende Farben und eine Gruppe zugeordneter Punkte",

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scans import bumps, mirrored, percent, places, posed, remeshed
+from scipy.spatial import KDTree
 from surfaces import planar, rings
 
 from solver import AlignSettings, TriangleMesh, align, correspond, flatten, topology
@@ -127,6 +130,56 @@ def test_where_each_lacks_a_third_the_map_is_doubted():
     error = percent(places(found, source), sheet.vertices[there], sheet)
     assert (error[np.isin(there, here)].mean() < 1) != any(said.startswith("doubtful: ") for said in alignment.warnings)
     assert (error < 2)[found.matched].mean() > 0.9 or found.matched.mean() < 0.1
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_where_the_best_map_does_not_fit_the_next_is_taken(seed):
+    """The middle alone shows the same, and another place of the other sheet has more samples like it."""
+    sheet = bumps(2500, seed=seed)
+    source, here = cropped(sheet, 2.0, 0.3)
+    target, there = cropped(sheet, 4.5, 0.3)
+    target, kept = remeshed(posed(target, 2), 0.7, 3)
+    alignment = align(source, target, SMALL)
+    assert alignment.search.certified
+    assert alignment.taken is not None
+    assert alignment.taken.value < alignment.search.value
+    assert any(warning.startswith("reconsidered: ") for warning in alignment.warnings)
+    error = percent(places(correspond(alignment), source), sheet.vertices[there[kept]], sheet)
+    assert error[np.isin(there[kept], here)].mean() < 0.3
+    # the search's best, as asked for by whoever does not want it reconsidered
+    winner = align(source, target, replace(SMALL, refine="mobius"))
+    assert winner.taken is None
+    assert winner.search.value == alignment.search.value
+
+
+@pytest.mark.parametrize("cut", [0.2, 0.3])
+def test_opposite_sides_of_something_symmetric_are_not_taken_for_mirror_images(cut):
+    """The left of one scan and the right of the other are missing, so that mirrored they have more in common."""
+    disc = bumps(2500, seed=1)
+    x, y = disc.vertices[:, :2].T
+    rng, height = np.random.default_rng(5), np.zeros(len(x))
+    for _ in range(7):
+        (u, v), size, width = rng.uniform((0.15, -0.7), (0.8, 0.7)), rng.uniform(-0.25, 0.25), rng.uniform(6, 40)
+        for side in (1, -1):
+            height += (1 + 0.15 * side) * size * np.exp(-width * ((x - side * u) ** 2 + (y - v) ** 2))
+    sheet = TriangleMesh(np.column_stack([x, y, height]), disc.faces)
+    source, here = cropped(sheet, np.pi - 0.1, cut)
+    target, there = cropped(sheet, 0.1, cut)
+    target, kept = remeshed(posed(target, 2), 0.7, 3)
+    alignment = align(source, target, replace(SMALL, reflect="auto"))
+    assert alignment.other is not None
+    assert alignment.other.mobius.reflected
+    assert alignment.margin < -alignment.settings.reflect_margin
+    assert not alignment.mobius.reflected
+    assert alignment.warnings[0].startswith("ambiguous orientation: mirrored scores")
+    error = percent(places(correspond(alignment), source), sheet.vertices[there[kept]], sheet)
+    assert error[np.isin(there[kept], here)].mean() < 2
+    # landmarks have the last word, and whoever asks for one orientation
+    chosen = np.arange(100, len(source.vertices), 300)
+    image = sheet.vertices[here[chosen], :2] * [-1, 1]
+    pairs = np.stack([chosen, KDTree(sheet.vertices[there[kept], :2]).query(image)[1]], axis=1)
+    assert align(source, target, replace(SMALL, reflect="auto"), landmarks=pairs).mobius.reflected
+    assert align(source, target, replace(SMALL, reflect="always")).mobius.reflected
 
 
 def test_bent_sheets_may_overlap_in_part():

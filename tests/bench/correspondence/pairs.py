@@ -310,6 +310,12 @@ PARTIAL = (
 )
 """Shape, source, target, the direction in which one side is cut short, and the share of its area that goes."""
 
+CROPPED = 40
+"""Pairs of faces of which both are cut short."""
+
+CROPPED_SHARE = 0.3
+"""Share of its area that each of them lacks."""
+
 
 def _partial(store: Store, count: int | None) -> Iterator[Pair]:
     """Yield pairs of which first the source, then the target is cut short."""
@@ -318,6 +324,24 @@ def _partial(store: Store, count: int | None) -> Iterator[Pair]:
         cut = _cut(source.mesh, np.array(direction, float), share)
         yield pair("partial", source, target, True, 2 * k, store, source_part=cut)
         yield pair("partial", target, source, True, 2 * k + 1, store, target_part=cut)
+
+
+def _cropped(store: Store, count: int | None) -> Iterator[Pair]:
+    """Yield pairs of faces of which each is cut short on a side of its own, chosen at random."""
+    if reason := absent("faces_ict/ict_ground_truth.json") or absent("faces_simpop/SIMPOP_01.obj"):
+        print(f"cropped skipped: {reason}")
+        return
+    rng = np.random.default_rng(30)
+    faces = [(simpop, pair) for pair in SIMPOP] + [(ict, pair) for pair in ICT]
+    for k in range(CROPPED if count is None else min(count, CROPPED)):
+        shape, pair_of_names = faces[rng.integers(len(faces))]
+        source, target = (shape(name) for name in rng.permutation(pair_of_names))
+        angles = rng.uniform(0, 2 * np.pi, 2)
+        parts = [
+            _cut(side.mesh, np.array([np.cos(angle), np.sin(angle), 0.1]), CROPPED_SHARE)
+            for side, angle in zip((source, target), angles, strict=True)
+        ]
+        yield pair("cropped", source, target, True, k, store, source_part=parts[0], target_part=parts[1])
 
 
 def _one_open(store: Store, count: int | None) -> Iterator[Pair]:
@@ -352,5 +376,6 @@ SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
     "bent": _bent,
     "partial": _partial,
+    "cropped": _cropped,
 }
 """Each set by its name: pairs in both directions, of the first `count` if given."""
