@@ -149,6 +149,7 @@ GERMAN = {
     "Normals of face corners, turned with the surface": "Normalen der Flächenecken, mit der Fläche gedreht",
     "Not Mirrored": "Nicht gespiegelt",
     "Not certified: gap {:.2f}": "Nicht bewiesen: Lücke {:.2f}",
+    "Not the best match: gap {:.2f}": "Nicht die beste: Lücke {:.2f}",
     "Nothing is being computed": "Es wird nichts berechnet",
     "Nothing is shown side by side": "Nichts wird nebeneinander gezeigt",
     "Object": "Objekt",

@@ -94,6 +94,8 @@ class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
         column = layout.column(align=True)
         if found["certified"]:
             column.label(text="Certified: none matches more", icon="CHECKMARK")
+        elif found["rival_taken"]:
+            column.label(text=iface_("Not the best match: gap {:.2f}").format(found["gap"]), icon="INFO")
         else:
             column.label(text=iface_("Not certified: gap {:.2f}").format(found["gap"]), icon="ERROR")
         for name, value in _rows(found):

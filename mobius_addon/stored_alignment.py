@@ -45,9 +45,9 @@ def store(
     kept = target.data.mobius_alignment
     kept.source = source
     kept.source_fingerprint, kept.target_fingerprint = (surface.fingerprint() for surface in surfaces)
-    kept.value = alignment.search.value
+    kept.value = alignment.value
     kept.upper_bound = alignment.search.upper_bound
-    kept.certified = alignment.search.certified
+    kept.certified = alignment.certified
     kept.reflected = alignment.mobius.reflected
     about = report(alignment, correspondence)
     kept.coverage = about["coverage"]

@@ -95,7 +95,7 @@ class Alignment:
         The certified search that found it; `mobius` may be refined beyond `search.mobius`.
     source, target : Flattening
     source_samples, target_samples : (N1,), (N2,) int
-        Vertices that stood for the surfaces in the search; `search.matches` index into these.
+        Vertices that stood for the surfaces in the search; `matches` index into these.
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of all vertices.
     objective : Objective
@@ -151,10 +151,25 @@ class Alignment:
             return None
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
 
+    @property
+    def value(self) -> float:
+        """Q of the search's map that was gone on with."""
+        return (self.taken or self.search).value
+
+    @property
+    def matches(self) -> Integers:
+        """Its matches, (k, 2): rows of `source_samples` and `target_samples`."""
+        return (self.taken or self.search).matches
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is proved that no Möbius transformation of its orientation with |z| <= z_max has a larger Q."""
+        return self.taken is None and self.search.certified
+
     @cached_property
     def matched_weights(self) -> Floats:
-        """The weight, (N1,), with which each source sample matched under the map that was taken; 0 where it did not."""
-        rows, columns = (self.taken or self.search).matches.T
+        """The weight, (N1,), with which each source sample matched; 0 where it did not."""
+        rows, columns = self.matches.T
         result = np.zeros(len(self.source_samples))
         result[rows] = self.objective.weights[rows, columns]
         return result
@@ -162,7 +177,7 @@ class Alignment:
     @cached_property
     def difference(self) -> float:
         """By how much descriptors of points that belong together differ, from the samples that matched."""
-        rows, columns = (self.taken or self.search).matches.T
+        rows, columns = self.matches.T
         return usual_difference(
             self.source_descriptors[self.source_samples[rows]], self.target_descriptors[self.target_samples[columns]]
         )

@@ -79,7 +79,7 @@ def evidence(alignment: Alignment) -> Floats:
         there, weights = TriangulatedDisc.of(source.disc, faces).locate(start)
         moved = np.linalg.norm(np.einsum("qk,qkd->qd", weights, vertices[faces[there]]) - places, axis=1) / root
         offset = alignment.bending.offset[used]
-    unmatched = 1 - (alignment.taken or alignment.search).value / len(alignment.source_samples)
+    unmatched = 1 - alignment.value / len(alignment.source_samples)
     return np.stack(
         [
             np.ones(len(used)),

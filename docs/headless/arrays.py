@@ -31,6 +31,6 @@ correspondence = solver.correspond(alignment)
 carried = solver.interpolate(correspondence, source.vertices)  # any values at source vertices; here their places
 
 error = np.linalg.norm(carried - target.vertices, axis=1)
-print(f"matched {alignment.search.value:.2f} of at most {alignment.search.upper_bound:.2f}", end=", ")
-print("certified" if alignment.search.certified else "not certified")
+print(f"matched {alignment.value:.2f} of at most {alignment.search.upper_bound:.2f}", end=", ")
+print("certified" if alignment.certified else "not certified")
 print(f"off by {np.median(error):.4f} in the median, on a surface 2 across")

@@ -165,7 +165,7 @@ def discs(alignment: solver.Alignment, source: bpy.types.Object, target: bpy.typ
     # both turned alike, so that the source's face looks out of its disc upright
     seen = surface.vertices[:, 0] + 1j * surface.vertices[:, 2]
     turn = np.exp(1j * np.angle(np.sum(surface.vertex_areas * seen * np.conj(carried))))
-    ends = zip((alignment.source_samples, alignment.target_samples), alignment.search.matches.T, strict=True)
+    ends = zip((alignment.source_samples, alignment.target_samples), alignment.matches.T, strict=True)
     from_samples, to_samples = (samples[pairs] for samples, pairs in ends)
     colors = hues(still[to_samples])
     return (

@@ -198,9 +198,10 @@ def summary(source: str, target: str, alignment: solver.Alignment, correspondenc
 def _proof(alignment: solver.Alignment) -> str:
     """Say what a search found and proved."""
     search = alignment.search
-    proof = (
-        f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more"
-        if search.certified
-        else f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
-    )
-    return f"matched value {search.value:.2f} of at most {len(alignment.source_samples)}, {proof}"
+    if alignment.certified:
+        proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more"
+    elif alignment.taken is not None:
+        proof = f"not the best match: another map has {search.value:.2f}"
+    else:
+        proof = f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
+    return f"matched value {alignment.value:.2f} of at most {len(alignment.source_samples)}, {proof}"

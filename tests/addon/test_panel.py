@@ -177,6 +177,12 @@ def test_the_rival_can_be_taken(pair: tuple[Any, Any]) -> None:
     rival = aligned_report(pair[1])
     assert rival["settings"]["take_rival"] is True
     assert rival["mobius"] == best["rival"]["mobius"] != best["mobius"]
+    assert best["certified"]
+    assert not best["rival_taken"]
+    assert rival["rival_taken"]
+    assert not rival["certified"]
+    assert rival["value"] == best["rival"]["value"] < rival["upper_bound"]
+    assert f"Not the best match: gap {rival['gap']:.2f}" in drawn(panel.MOBIUS_PT_result)
 
 
 def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
