@@ -48,7 +48,7 @@ FITS = 0.75
 the right ones had 0.79 or more, and wrong ones on faces, teeth and sheets 0.55 or less."""
 
 HYPOTHESES = 3
-"""Further maxima of the search at most that are bent too where the best one's map is doubtful."""
+"""Maxima of the search that are bent, at most, in place of a map that is doubtful, or mirrored."""
 
 DRAFTS = 4
 """Drafts at most until the overlap is settled."""
@@ -149,14 +149,12 @@ def _reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignmen
 
 def _fitting(matched: Alignment, clock: Part, *, best: bool) -> Alignment | None:
     """Return what the first of the search's maxima leads to that fits; `best`: it may be the best itself."""
-    known: list[Mobius] = []
-    for number in range(HYPOTHESES + 1):
-        part = clock.part(number / (HYPOTHESES + 1), (number + 1) / (HYPOTHESES + 1))
+    known = [] if best else [matched.search.mobius]
+    for number in range(HYPOTHESES):
+        part = clock.part(number / HYPOTHESES, (number + 1) / HYPOTHESES)
         part.begin("reconsider", "Trying the next best map", 0.0)
         rival = _rival(matched, known, None, part) if known else None
         known.append((rival or matched.search).mobius)
-        if rival is None and not best:
-            continue
         found = _bent(_taking(matched, rival, part.within(0.2, 0.4)), part.part(0.4, 1.0), None)
         if _mean_confidence(found) >= FITS:
             return found

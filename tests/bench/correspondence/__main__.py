@@ -63,9 +63,12 @@ def line(row: Row) -> str:
         said.append("WRONG SIDE")
     if facts.get("unfolded", 0) >= 0.005:
         said.append(f"{100 * facts['unfolded']:.0f} % UNBENT")
-    said += [" ".join(w.split()[:2]).rstrip(":") for w in facts.get("warnings", ()) if w.startswith("ambiguous")]
+    told = ("ambiguous", "doubtful", "reconsidered")
+    said += [" ".join(w.split()[:2]).split(":")[0] for w in facts.get("warnings", ()) if w.startswith(told)]
     if facts.get("margin") is not None:
-        said.append(f"side {facts['margin']:+.3f}, rival {facts['rival_margin']:+.3f}, value {facts['value']:.1f}")
+        said.append(f"side {facts['margin']:+.3f}, value {facts['value']:.1f}")
+    if facts.get("rival_margin") is not None:
+        said.append(f"rival {facts['rival_margin']:+.3f}")
     said.append(" ".join(f"{stage} {t:.1f}" for stage, t in facts.get("seconds", {}).items() if t >= 0.05))
     return (
         f"{pair.kind:10} {pair.name:36} {row.method:14} {measured.mean:6.2f} {measured.p95:6.2f} {marks:>6} "
