@@ -34,7 +34,8 @@ class AlignSettings:
     z_max : float
         Bound on |z|, in (0, 1): how far the centres of the two discs may lie apart.
     compatible : float
-        Share of the target that a source point may match, in (0, 1]: what is most like it.
+        Share of the target that a source point may match, in (0, 1]: what is most like it. On 7 sets of pairs 87 to
+        98 % of the counterparts are within 0.2, and beyond they are no likelier than chance (`tests/bench/ranks.py`).
     reflect : str
         "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly.
     reflect_margin : float
