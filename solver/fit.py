@@ -114,7 +114,8 @@ def algebraic_fit(source: Complexes, target: Complexes, weights: Floats) -> Mobi
     """
     x, y = source, target
     rows = np.stack([y - x, -1j * (y + x), x * y - 1, -1j * (x * y + 1)], axis=1) * np.sqrt(weights)[:, None]
-    _, _, basis = np.linalg.svd(np.concatenate([rows.real, rows.imag]), full_matrices=True)
+    # the triangular factor has the same singular vectors, and four rows
+    _, _, basis = np.linalg.svd(np.linalg.qr(np.concatenate([rows.real, rows.imag]), mode="r"), full_matrices=True)
     a, b = complex(basis[-1, 0], basis[-1, 1]), complex(basis[-1, 2], basis[-1, 3])
     if abs(b) >= abs(a):
         return Mobius()

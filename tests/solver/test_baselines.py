@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from instances import disc_points, planted
@@ -205,3 +207,16 @@ def test_voting_is_reproducible_and_depends_on_its_seed_alone():
     one, same, other = (voting(source, target, 0.03, samples=500, seed=s).mobius for s in (1, 1, 2))
     assert one == same
     assert one != other
+
+
+def test_a_fit_of_many_points_needs_no_more_memory_than_they():
+    """As the vertices of a scan: a square matrix of so many rows would fill the machine."""
+    rng = np.random.default_rng(5)
+    x = 0.9 * np.sqrt(rng.random(5000)) * np.exp(2j * np.pi * rng.random(5000))
+    truth = Mobius(0.3 - 0.2j, 1.0)
+    tracemalloc.start()
+    found = algebraic_fit(x, truth(x), np.ones(len(x)))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert np.abs(found(x) - truth(x)).max() < 1e-9
+    assert most < 100 * x.nbytes
