@@ -44,9 +44,11 @@ DOUBTFUL = 0.5
 """Mean confidence up to which the whole map is doubted aloud."""
 
 FITS = 0.75
-"""Mean confidence from which on another map than the search's best is taken. Of the maxima that were bent for 40 pairs of
-faces that lack 30 % each, the right ones had 0.79 or more, the wrong ones 0.31 or less; on teeth and sheets, not mirrored
-where mirrored is right, they had 0.55 at most."""
+"""Mean confidence from which on another map than the search's best is taken.
+
+Of the maxima that were bent for 40 pairs of faces that lack 30 % each, the right ones had 0.79 or more, the wrong ones
+0.31 or less; on teeth and sheets, not mirrored where mirrored is right, they had 0.55 at most.
+"""
 
 HYPOTHESES = 3
 """Maxima of the search that are bent, at most, in place of a map that is doubtful, or mirrored."""
