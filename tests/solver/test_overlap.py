@@ -8,7 +8,7 @@ from scans import bumps, mirrored, percent, places, posed, remeshed
 from scipy.spatial import KDTree
 from surfaces import planar, rings
 
-from solver import AlignSettings, TriangleMesh, align, correspond, flatten, report, topology
+from solver import AlignSettings, Progress, TriangleMesh, align, correspond, flatten, report, topology
 from solver.align import _surely_better
 from solver.distortion import signed_areas
 from solver.overlap import depth_beyond, piece
@@ -139,16 +139,20 @@ def test_where_the_best_map_does_not_fit_the_next_is_taken(seed):
     source, here = cropped(sheet, 2.0, 0.3)
     target, there = cropped(sheet, 4.5, 0.3)
     target, kept = remeshed(posed(target, 2), 0.7, 3)
-    alignment = align(source, target, SMALL)
+    told: list[Progress] = []
+    alignment = align(source, target, SMALL, told.append)
+    assert any(step.stage == "Trying the next best map" for step in told)
+    assert (np.diff([step.fraction for step in told]) >= 0).all()
+    assert told[-1].fraction <= 1
     assert alignment.search.certified
     assert alignment.taken is not None
     assert alignment.value == alignment.taken.value < alignment.search.value
     assert not alignment.certified
-    told = report(alignment, correspond(alignment))
-    assert told["rival_taken"]
-    assert not told["certified"]
-    assert told["value"] == alignment.value
-    assert told["gap"] == alignment.search.upper_bound - alignment.value > 0
+    said = report(alignment, correspond(alignment))
+    assert said["rival_taken"]
+    assert not said["certified"]
+    assert said["value"] == alignment.value
+    assert said["gap"] == alignment.search.upper_bound - alignment.value > 0
     assert any(warning.startswith("reconsidered: ") for warning in alignment.warnings)
     error = percent(places(correspond(alignment), source), sheet.vertices[there[kept]], sheet)
     assert error[np.isin(there[kept], here)].mean() < 0.3
