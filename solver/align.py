@@ -102,7 +102,7 @@ def align(
     if settings.refine == "dense":
         part = clock.part(0.7, 0.95)
         found = _bent(matched, _drafted(matched, part), part, landmarks)
-        if not settings.take_rival and not np.size([] if landmarks is None else landmarks):  # these decide
+        if not settings.take_rival and (landmarks is None or np.size(landmarks) == 0):  # these decide
             found = _reconsidered(found, matched, clock.part(0.95, 1))
     clock.end()
     found = replace(found, seconds=clock.seconds)
@@ -150,8 +150,8 @@ def _reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignmen
             found = replace(found, warnings=(*found.warnings, said))
     if _mean_confidence(found) <= DOUBTFUL:
         other = _fitting(matched, clock.part(0.5, 1.0, "reconsider"), best=False)
-        if other is not None and other.taken is not None and sure(other) > sure(found):
-            behind = 100 * (matched.search.value - other.taken.value) / len(matched.source_samples)
+        if other is not None and sure(other) > sure(found):
+            behind = 100 * (matched.search.value - other.value) / len(matched.source_samples)
             said = f"reconsidered: the best map does not fit; one that scores {behind:.1f} % of the samples less does"
             return replace(other, warnings=(said, *other.warnings))
     return found
@@ -290,9 +290,7 @@ def _unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
     used = np.flatnonzero(there & np.isfinite(found.target.disc.real))
     if len(used) == 0:
         return np.inf
-    places = draft.places(found.target)
-    normals = TriangleMesh(places, draft.whole.faces).vertex_normals()
-    located = draft.onto.nearest_point(places[used], normals[used])
+    located = (of_each[used] for of_each in draft.located(found.target))
     distance = descriptor_distance(found.source, found.source_descriptors, found.target_descriptors[used], *located)
     areas = found.target.mesh.vertex_areas[used]
     return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
@@ -384,17 +382,13 @@ def _overlap(
         return None
     if not _surely_better(inner.matched_weights, found.matched_weights):
         return None
-    used = np.flatnonzero(np.isfinite(found.target.disc.real))
-    places = draft.places(found.target)
-    normals = TriangleMesh(places, draft.whole.faces).vertex_normals()
-    face, barycentric = np.full(len(places), -1), np.zeros((len(places), 3))
-    face[used], barycentric[used] = draft.onto.nearest_point(places[used], normals[used])
+    face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
 
     clock.begin("bend", "Bending", 0.5)
     scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
-    start = scale * (places[target_part.vertices] - middle)
+    start = scale * (draft.places(found.target)[target_part.vertices] - middle)
     again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
     _, there = shared(again, inner.source, inner.target, clock.within(0.6, 0.6))
     bending = finished(

@@ -143,6 +143,18 @@ class Draft:
         places[used] = _following(self.nodes, self.flat, self.now, target.disc, self.unbent, used)
         return places
 
+    def located(self, target: Flattening) -> tuple[Integers, Floats]:
+        """Return the source's face nearest to each target vertex, (n,), and where in it, (n, 3).
+
+        -1 and 0 at vertices in no face.
+        """
+        places = self.places(target)
+        normals = TriangleMesh(places, self.whole.faces).vertex_normals()
+        used = np.flatnonzero(np.isfinite(target.disc.real))
+        face, barycentric = np.full(len(places), -1), np.zeros((len(places), 3))
+        face[used], barycentric[used] = self.onto.nearest_point(places[used], normals[used])
+        return face, barycentric
+
 
 def drafted(
     mobius: Mobius,
