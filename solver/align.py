@@ -290,8 +290,10 @@ def _unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
     used = np.flatnonzero(there & np.isfinite(found.target.disc.real))
     if len(used) == 0:
         return np.inf
-    located = (of_each[used] for of_each in draft.located(found.target))
-    distance = descriptor_distance(found.source, found.source_descriptors, found.target_descriptors[used], *located)
+    face, barycentric = draft.located(found.target)
+    distance = descriptor_distance(
+        found.source, found.source_descriptors, found.target_descriptors[used], face[used], barycentric[used]
+    )
     areas = found.target.mesh.vertex_areas[used]
     return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
 
