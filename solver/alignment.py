@@ -37,7 +37,8 @@ class AlignSettings:
         Share of the target that a source point may match, in (0, 1]: what is most like it. On 7 sets of pairs 87 to
         98 % of the counterparts are within 0.2, and beyond they are no likelier than chance (`tests/bench/ranks.py`).
     reflect : str
-        "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly.
+        "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly
+        and, with dense refinement, no map that is not reflected fits.
     reflect_margin : float
         Share of the samples by which a reflection has to win, and below which an orientation, or a rival that maps
         everything elsewhere, is called ambiguous. On 8 pairs of nearly mirror symmetric faces the orientations

@@ -199,7 +199,9 @@ def _proof(alignment: solver.Alignment) -> str:
     """Say what a search found and proved."""
     search = alignment.search
     if alignment.certified:
-        proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more"
+        # the other orientation's best may be ahead
+        among = " in this orientation" if alignment.margin is not None and alignment.margin < 0 else ""
+        proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more{among}"
     elif alignment.taken is not None:
         proof = f"not the best match: another map has {search.value:.2f}"
     else:
