@@ -9,6 +9,7 @@ from importlib import import_module
 _TOOLS = (
     "edits",
     "topology_cache",
+    "kept_surfaces",
     "overlay",
     "preferences",
     "properties",

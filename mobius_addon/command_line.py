@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..solver import Alignment, AlignSettings, Correspondence, TriangleMesh
-    from ..solver.mesh import Integers
+    from ..solver.surface.mesh import Integers
     from .attributes import Transfer, TransferSettings
     from .files import Imported
     from .mesh_data import Surface

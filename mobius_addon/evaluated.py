@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 
 from ..solver import Correspondence, TriangleMesh
-from ..solver.confidence import BOUND
-from ..solver.mesh import Floats, Integers
-from ..solver.surface_points import SurfacePoints
+from ..solver.align.confidence import BOUND
+from ..solver.surface.mesh import Floats, Integers
+from ..solver.surface.nearest import SurfacePoints
 from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface
 
 _TRACE = "mobius_trace"

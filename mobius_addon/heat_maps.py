@@ -9,8 +9,8 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ..solver import Correspondence, Flattening, TriangleMesh
-from ..solver.distortion import dilatations, log_conformal_factor
-from ..solver.mesh import Booleans, Complexes, Floats
+from ..solver.flatten.distortion import dilatations, log_conformal_factor
+from ..solver.surface.mesh import Booleans, Complexes, Floats
 
 WORST_DILATATION = 2.0
 """Where the scale of the dilatation ends: the larger stretch is twice the smaller one."""

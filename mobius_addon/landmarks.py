@@ -11,7 +11,7 @@ from mathutils import Vector
 from scipy.spatial import KDTree
 
 from ..solver import TriangleMesh
-from ..solver.mesh import Floats, Integers
+from ..solver.surface.mesh import Floats, Integers
 from .mesh_data import Refusal, mirrored
 
 NONE = np.empty((0, 2), np.intp)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..solver import TriangleMesh
-from ..solver.mesh import Floats, Integers
+from ..solver.surface.mesh import Floats, Integers
 
 
 class Refusal(Exception):  # noqa: N818  (no error of the program)

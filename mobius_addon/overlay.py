@@ -17,8 +17,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from gpu_extras.batch import batch_for_shader
 
 from ..solver import MeshError
-from ..solver.mesh import Complexes, Floats
-from ..solver.sampling import spread
+from ..solver.surface.mesh import Complexes, Floats
+from ..solver.surface.sampling import spread
 from . import edits, stored_alignment
 from .heat_maps import MAP_MEASURES, Measure, measure, shown_by, srgb
 from .mesh_data import Refusal, foreach, read_surface

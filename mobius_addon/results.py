@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..solver.mesh import Booleans, Complexes, Floats
+from ..solver.surface.mesh import Booleans, Complexes, Floats
 from .attributes import MAX_UV_MAPS, SHARED_LAYOUT, AttributeAccess, VertexGroupAccess
 from .mesh_data import Refusal, Surface, foreach
 

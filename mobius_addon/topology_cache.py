@@ -9,8 +9,9 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ..solver import MeshError, Topology, TriangleMesh, topology
+from ..solver.surface.cleaning import in_order
 from . import edits
-from .computation import Repair, in_order
+from .computation import Repair
 from .mesh_data import read_surface
 
 MAX_POLYGONS = 200_000
@@ -61,7 +62,7 @@ def store(obj: bpy.types.Object, mesh: TriangleMesh, repair: Repair) -> None:
 
 def _line(mesh: TriangleMesh, repair: Repair) -> Line:
     try:
-        mesh = in_order(mesh, repair).mesh
+        mesh = in_order(mesh, largest_part=repair.largest_part).mesh
     except MeshError as error:
         refused = _rows(str(error).removeprefix(f"'{mesh.name}' "))
     else:

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..solver.mesh import Floats
+from ..solver.surface.mesh import Floats
 
 
 def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:

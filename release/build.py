@@ -1,8 +1,8 @@
 """The extension's zips, one per platform: our files, scipy's wheels and the compiled kernels as a wheel of our own.
 
 `blender_manifest.toml` names the wheels; `wheels.sha256` says what each that is not ours has to be. pip fetches those,
-`solver/kernels/build_wheel.py` compiles ours, and the builder of Blender's own extension system, from the Python module
-`bpy`, packs and validates: no Blender has to run.
+`solver/search/kernels/build_wheel.py` compiles ours, and the builder of Blender's own extension system, from the Python
+module `bpy`, packs and validates: no Blender has to run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..solver.kernels import build_wheel
+from ..solver.search.kernels import build_wheel
 
 ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = "blender_manifest.toml"
@@ -102,7 +102,7 @@ def get_wheels(wheels: Iterable[str], platform: str) -> None:
         if name.startswith(build_wheel.PACKAGE):
             sources = [build_wheel.HERE / source for source in ("kernels.c", "build_wheel.py", "pyproject.toml")]
             if not is_newer(WHEELS / name, sources) and build_wheel.wheel(platform, WHEELS).name != name:
-                raise BuildError(f"{MANIFEST} names '{name}', which is not what solver/kernels builds")
+                raise BuildError(f"{MANIFEST} names '{name}', which is not what solver/search/kernels builds")
         elif not has_hash(WHEELS / name, pinned(name)):
             fetch(name)
 

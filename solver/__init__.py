@@ -1,25 +1,17 @@
 """Certified conformal correspondence between two triangulated discs, over plain arrays.
 
-In the order of the pipeline: a `TriangleMesh` is checked (`topology`), flattened (`flatten`), searched for the best
-`Mobius` transformation (`search`), aligned as a whole (`align`) and turned into a dense map (`correspond`) that carries
-values (`interpolate`).
+In the order of the pipeline, and of the folders, each of which imports only from those before it: a `TriangleMesh` is
+checked and measured (`surface`), flattened (`flatten`), searched for the best `Mobius` transformation (`search`), bent
+onto the other surface (`bend`), aligned as a whole (`align`) and turned into a dense map that carries values (`carry`).
 """
 
-from .align import align
-from .alignment import Alignment, AlignSettings
-from .circle_packing import silhouette_mesh
-from .cleaning import Cleaned, cleaned
-from .correspond import Correspondence, correspond
-from .distortion import Distortion
-from .flatten import Flattening, flatten
-from .interpolate import interpolate, interpolate_corners
-from .map_file import load_map, save_map
-from .mesh import MeshError, TriangleMesh
+from .align import Alignment, AlignSettings, Surface, align, prepare
+from .carry import Correspondence, correspond, interpolate, interpolate_corners, load_map, report, save_map
+from .flatten import Distortion, Flattening, flatten, silhouette_mesh
 from .mobius import Mobius
-from .report import report
-from .search import SearchProgress, SearchResult, search
-from .stages import Cancelled, Progress
-from .topology import Topology, require_disc, topology
+from .search import SearchResult, search
+from .stages import Cancelled, Progress, SearchProgress
+from .surface import Cleaned, MeshError, Topology, TriangleMesh, cleaned, require_disc, topology
 
 __all__ = [
     "AlignSettings",
@@ -34,6 +26,7 @@ __all__ = [
     "Progress",
     "SearchProgress",
     "SearchResult",
+    "Surface",
     "Topology",
     "TriangleMesh",
     "align",
@@ -43,6 +36,7 @@ __all__ = [
     "interpolate",
     "interpolate_corners",
     "load_map",
+    "prepare",
     "report",
     "require_disc",
     "save_map",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .mesh import Complexes, Floats
+from .surface.mesh import Complexes, Floats
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .search import SearchProgress
-
 
 class Cancelled(Exception):  # noqa: N818  (not an error: the user's own wish)
     """The progress callback ended the work."""
@@ -103,3 +101,13 @@ class Part:
     def searching(self, share: float) -> Callable[[SearchProgress], bool | None] | None:
         """Return what a search that is a `share` of this part calls."""
         return self.stages.searching(share * (self.last - self.first))
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """What is proved so far: no transformation exceeds `upper_bound`, and one in hand reaches `value`."""
+
+    value: float
+    upper_bound: float
+    nodes: int
+    seconds: float

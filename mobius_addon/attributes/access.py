@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import bpy
 import numpy as np
 
-from ...solver.mesh import Booleans
+from ...solver.surface.mesh import Booleans
 from ..heat_maps import DISC_MEASURES, MAP_MEASURES
 from ..mesh_data import Refusal, foreach
 from .carrier import Values

@@ -11,16 +11,11 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ...solver import Correspondence
-from ...solver.fill import HarmonicFill, nearest_known, with_nearest
-from ...solver.interpolate import (
-    CornerInterpolation,
-    edges_in_reach,
-    local_similarities,
-    source_of_corners,
-    source_of_edges,
-    source_of_faces,
-)
-from ...solver.mesh import Booleans, Floats, Integers
+from ...solver.carry.corners import CornerInterpolation
+from ...solver.carry.elements import edges_in_reach, source_of_corners, source_of_edges, source_of_faces
+from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
+from ...solver.carry.frames import local_similarities
+from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
 
 Values = npt.NDArray[Any]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...solver.mesh import Floats, Integers
+from ...solver.surface.mesh import Floats, Integers
 from ..mesh_data import Refusal, foreach
 from .settings import Mask
 from .vertex_groups import read_weights

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...solver.mesh import Booleans
+from ...solver.surface.mesh import Booleans
 from ..mesh_data import foreach
 from .access import Layer
 from .carrier import Values

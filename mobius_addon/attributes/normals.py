@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...solver.mesh import Booleans, Floats
+from ...solver.surface.mesh import Booleans, Floats
 from ..mesh_data import foreach, mirrored
 from .access import Layer
 from .carrier import Values

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...solver import Cancelled, Progress
-from ...solver.mesh import Booleans, Floats
+from ...solver.surface.mesh import Booleans, Floats
 from ..mesh_data import Refusal
 from .access import MAX_UV_MAPS, OWN_NAMES
 from .carrier import Carrier, Values

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ...solver.mesh import Booleans
+from ...solver.surface.mesh import Booleans
 from .access import FACE_SETS, SCULPT_MASK, SEAMS, SHARPNESS, SMOOTHNESS, Access, AttributeAccess
 from .carrier import Carrier, Values
 from .materials import MaterialAccess

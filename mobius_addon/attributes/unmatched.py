@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...solver import Correspondence, interpolate
-from ...solver.fill import without
-from ...solver.mesh import Booleans, Floats, plural
+from ...solver.carry.fill import without
+from ...solver.surface.mesh import Booleans, Floats, plural
 from ..mesh_data import Surface
 from .carrier import Carrier
 from .settings import Outcome

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
-from ...solver.mesh import Booleans
+from ...solver.surface.mesh import Booleans
 from ..mesh_data import foreach
 from .access import OWN_NAMES, Layer, numbered
 from .carrier import Values

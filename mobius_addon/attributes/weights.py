@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.mesh import Booleans, Floats
+from ...solver.surface.mesh import Booleans, Floats
 
 
 def tidied(

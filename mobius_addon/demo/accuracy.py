@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...solver import Correspondence
-from ...solver.mesh import Floats
+from ...solver.surface.mesh import Floats
 from ..mesh_data import Surface
 from .scans import POSE, GroundTruth, deform
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...solver.mesh import Floats
+from ...solver.surface.mesh import Floats
 from ..mesh_data import foreach
 from .scans import read_vertices
 

@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 from scipy.spatial.transform import Rotation
 
-from ...solver.mesh import Complexes, Floats, Integers
+from ...solver.surface.mesh import Complexes, Floats, Integers
 from ..mesh_data import Refusal
 from .scans import read_vertices, write_vertices
 

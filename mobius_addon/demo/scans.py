@@ -17,7 +17,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from scipy.spatial.transform import Rotation
 
-from ...solver.mesh import Floats, Integers
+from ...solver.surface.mesh import Floats, Integers
 from ..mesh_data import foreach
 
 SUBDIVISIONS = 2

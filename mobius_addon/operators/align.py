@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.spatial import KDTree
 
 from ... import solver
-from ...solver.mesh import Floats
+from ...solver.surface.mesh import Floats
 from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..computation import aligned

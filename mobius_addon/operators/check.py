@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...solver import MeshError, Topology, TriangleMesh, topology
-from ...solver.mesh import Booleans
+from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
 from ..options import repair

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from ...solver import MeshError
-from ...solver.mesh import plural
+from ...solver.surface.mesh import plural
 from .. import stored_alignment, viewport
 from ..attributes import mask_weights, unmatched_vertices
 from ..mesh_data import Refusal, foreach, read_surface

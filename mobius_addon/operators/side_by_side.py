@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ...solver import MeshError
-from ...solver.mesh import Floats
+from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..mesh_data import Refusal, foreach, read_surface

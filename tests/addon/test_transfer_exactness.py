@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 from mobius_extension.mobius_addon.attributes import Carrier, TransferSettings, plan_transfer  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import foreach, read_surface  # noqa: E402
 from mobius_extension.solver import Correspondence  # noqa: E402
-from mobius_extension.solver.locate import TriangulatedDisc  # noqa: E402
+from mobius_extension.solver.flatten.locate import TriangulatedDisc  # noqa: E402
 
 
 def test_everything_at_once_comes_back_bit_for_bit_from_an_identical_mesh() -> None:

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from scipy.special import expit
 
 from solver import Alignment, AlignSettings, align
-from solver.confidence import BOUND, COLUMNS, evidence
+from solver.align.confidence import BOUND, COLUMNS
 
 from .correspondence.pairs import SETS, Pair
 from .correspondence.store import Store, code
@@ -63,7 +63,7 @@ def _evidence(found: Alignment) -> np.ndarray:
         inner, vertices = found.overlap.alignment, found.overlap.target.vertices
     used = vertices[np.isfinite(inner.target.disc.real)]
     result = np.full((len(found.target.disc), len(COLUMNS)), np.nan)
-    result[used] = evidence(inner)
+    result[used] = inner.evidence
     if found.counterpart is not None:
         result[~found.counterpart] = np.nan
     return result

@@ -29,13 +29,18 @@ from mesh_files import read_mesh  # noqa: E402
 from scipy.sparse import csc_array, csc_matrix, csr_matrix  # noqa: E402
 from scipy.sparse.linalg import splu  # noqa: E402
 
-from solver import Mobius, TriangleMesh, flatten, topology  # noqa: E402
-from solver.cholesky import nested_dissection_cholesky  # noqa: E402
-from solver.distortion import Distortion, angle_errors, distortion  # noqa: E402
-from solver.flatten import _surface  # noqa: E402
-from solver.harmonic import _dirichlet_systems  # noqa: E402
-from solver.intrinsic_delaunay import without_chords  # noqa: E402
+from solver import (  # noqa: E402
+    Mobius,
+    TriangleMesh,
+    flatten,
+    topology,
+)
+from solver.flatten.distortion import Distortion, angle_errors, distortion  # noqa: E402
+from solver.flatten.flatten import _surface  # noqa: E402
+from solver.flatten.harmonic import _dirichlet_systems  # noqa: E402
 from solver.mobius import conformal_barycentre  # noqa: E402
+from solver.surface.cholesky import nested_dissection_cholesky  # noqa: E402
+from solver.surface.intrinsic_delaunay import without_chords  # noqa: E402
 
 TARGETS = {"human_face": 1.21, "chinese_lion": 1.42, "human_brain": 1.46}
 

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from solver import AlignSettings
-from solver.descriptors import diffused_curvatures, standardised
-from solver.objective import interior, source_points
-from solver.sampling import farthest_points
+from solver.align.objective import interior, source_points
+from solver.surface.descriptors import diffused_curvatures
+from solver.surface.sampling import farthest_points
+from solver.surface.statistics import standardised
 
 from .correspondence.pairs import SETS, Pair
 from .correspondence.store import Store

@@ -36,10 +36,15 @@ from mobius_extension.mobius_addon.attributes.vertex_groups import read_weights 
 from mobius_extension.mobius_addon.mesh_data import foreach, read_surface  # noqa: E402
 from mobius_extension.mobius_addon.operators.transfer import read_through  # noqa: E402
 from mobius_extension.solver import Correspondence  # noqa: E402
-from mobius_extension.solver.locate import TriangulatedDisc  # noqa: E402
+from mobius_extension.solver.flatten.locate import TriangulatedDisc  # noqa: E402
 
-from solver import TriangleMesh, align, correspond, topology  # noqa: E402
-from solver.surface_points import SurfacePoints  # noqa: E402
+from solver import (  # noqa: E402
+    TriangleMesh,
+    align,
+    correspond,
+    topology,
+)
+from solver.surface.nearest import SurfacePoints  # noqa: E402
 from tests.bench.correspondence.decimation import decimated  # noqa: E402
 from tests.bench.paper.data import absent, read  # noqa: E402
 from tests.solver.scans import posed  # noqa: E402

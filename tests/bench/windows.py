@@ -24,12 +24,12 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).resolve().parent)]
 
 from search import dense_instance, paper_instance  # noqa: E402
 
-from solver.kernels import CompiledKernels  # noqa: E402
-from solver.kernels.build_wheel import wheel  # noqa: E402
-from solver.kernels.compiled import ARENA, _Problem  # noqa: E402
-from solver.kernels.nodes import HALF, WIDTH, X, Y, new_nodes, whole_disc  # noqa: E402
-from solver.matching import Matching, matching  # noqa: E402
-from solver.search import SMALLEST_CELL  # noqa: E402
+from solver.search.branch_and_bound import SMALLEST_CELL  # noqa: E402
+from solver.search.kernels import CompiledKernels  # noqa: E402
+from solver.search.kernels.build_wheel import wheel  # noqa: E402
+from solver.search.kernels.compiled import ARENA, _Problem  # noqa: E402
+from solver.search.kernels.nodes import HALF, WIDTH, X, Y, new_nodes, whole_disc  # noqa: E402
+from solver.search.matching import Matching, matching  # noqa: E402
 
 
 def problems() -> dict[str, Matching]:

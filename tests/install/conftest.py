@@ -9,7 +9,7 @@ from zips import build
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The zip for this platform."""
-    from solver.kernels.build_wheel import this_platform
+    from solver.search.kernels.build_wheel import this_platform
 
     (path,) = build(tmp_path_factory.mktemp("dist"), this_platform())
     return path

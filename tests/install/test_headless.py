@@ -13,7 +13,7 @@ import pytest
 from blenders import NEWEST, OLDEST, blender
 from zips import ROOT
 
-from solver.kernels.build_wheel import this_platform
+from solver.search.kernels.build_wheel import this_platform
 
 PAGE = (ROOT / "docs/headless/README.md").read_text(encoding="utf-8")
 

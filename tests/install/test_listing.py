@@ -26,8 +26,8 @@ def sources() -> set[str]:
     if listed.returncode:
         pytest.skip("not a git checkout")
     names = {name for name in listed.stdout.split() if name.startswith(("solver/", "mobius_addon/"))}
-    others = {f"solver/kernels/{name}" for name in ("build_wheel.py", "pyproject.toml")}
-    return {name for name in names if not name.startswith("solver/baselines/")} - others
+    others = {f"solver/search/kernels/{name}" for name in ("build_wheel.py", "pyproject.toml")}
+    return {name for name in names if not name.startswith("solver/search/baselines/")} - others
 
 
 def test_the_zip_holds_the_extension_and_nothing_else(built: Path) -> None:
@@ -100,8 +100,8 @@ def git(folder: Path, *arguments: str) -> None:
 @pytest.mark.parametrize("known_to_git", [True, False])
 def test_what_lies_about_is_not_packed(known_to_git: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     project, staged = tmp_path / "project", tmp_path / "staged"
-    kept = ["__init__.py", "solver/mesh.py"]
-    strays = ["wheels/stray-1.0-py3-none-any.whl", "solver/__pycache__/mesh.cpython-311.pyc", ".venv/x.py"]
+    kept = ["__init__.py", "solver/surface/mesh.py"]
+    strays = ["wheels/stray-1.0-py3-none-any.whl", "solver/surface/__pycache__/mesh.cpython-311.pyc", ".venv/x.py"]
     unknown = ["demo/scene.blend", "solver/notes.txt"]
     for name in [*kept, *strays, *unknown]:
         (project / name).parent.mkdir(parents=True, exist_ok=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.kernels import build_wheel, compiled
-from solver.kernels.nodes import BOUND, HALF, WIDTH, X, Y, new_nodes
-from solver.matching import Matching
-from solver.matching import matching as make_matching
+from solver.search.kernels import build_wheel, compiled
+from solver.search.kernels.nodes import BOUND, HALF, WIDTH, X, Y, new_nodes
+from solver.search.matching import Matching
+from solver.search.matching import matching as make_matching
 
 BUDGET, ROOM = 200, 8192
 """As in replay.c."""

@@ -105,7 +105,7 @@ def main(path: str) -> None:
     align_and_transfer()
     scipy = Path(sys.modules["scipy"].__file__ or "").resolve()
     require(user in scipy.parents, f"scipy is the one in the zip, not {scipy}")
-    kernels = installed_module("solver.kernels.compiled").library()  # type: ignore[attr-defined]
+    kernels = installed_module("solver.search.kernels.compiled").library()  # type: ignore[attr-defined]
     require(kernels is not None and user in Path(kernels._name).resolve().parents, f"compiled kernels: {kernels}")
 
     for _ in range(2):

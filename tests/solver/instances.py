@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from solver import Mobius
-from solver.matching import Matching, matching
+from solver.search.matching import Matching, matching
 
 
 def disc_points(rng: np.random.Generator, count: int, largest: float = 1.0) -> np.ndarray:

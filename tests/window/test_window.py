@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.kernels.build_wheel import this_platform
+from solver.search.kernels.build_wheel import this_platform
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

@@ -9,10 +9,10 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from solver import TriangleMesh, silhouette_mesh, topology
-from solver.harmonic import factorised
-from solver.laplacian import laplacian
-from solver.locate import face_neighbours
-from solver.sampling import edge_graph
+from solver.flatten.harmonic import factorised
+from solver.surface.laplacian import laplacian
+from solver.surface.mesh import face_neighbours
+from solver.surface.sampling import edge_graph
 from tests.bench.paper.data import DATA, read
 from tests.solver.gif import read_gif
 

@@ -8,10 +8,11 @@ from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
 from solver import Alignment, AlignSettings, Mobius, align, correspond, search
-from solver.descriptors import diffused_curvatures, standardised
-from solver.fit import algebraic_fit, fitted
-from solver.locate import TriangulatedDisc
-from solver.objective import source_points
+from solver.align.objective import source_points
+from solver.flatten.locate import TriangulatedDisc
+from solver.search.fit import algebraic_fit, fitted
+from solver.surface.descriptors import diffused_curvatures
+from solver.surface.statistics import standardised
 
 from .pairs import Pair, nearest
 from .score import Map

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from solver import Flattening, TriangleMesh, flatten, topology
-from solver.surface_points import SurfacePoints
+from solver.surface.nearest import SurfacePoints
 from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import posed
 

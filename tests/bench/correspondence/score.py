@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.distortion import signed_areas
+from solver.flatten.distortion import signed_areas
 
 from .pairs import Pair, Places
 

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from solver import TriangleMesh, flatten
-from solver.descriptors import diffused_curvatures
-from solver.sampling import extrema, farthest_points
+from solver.surface.descriptors import diffused_curvatures
+from solver.surface.sampling import extrema, farthest_points
 
 from .data import DATA, absent, read
 from .surfaces import Pair, Side, moved

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from solver import Mobius, TriangleMesh, align
-from solver.fit import algebraic_fit, fitted
-from solver.measures import q_truth
 from solver.mobius import conformal_barycentre
+from solver.search.fit import algebraic_fit, fitted
+from solver.search.measures import q_truth
 
 from . import figures, quoted
 from .methods import BOUNDED, INVARIANT, METHODS, PRINTED, Problem, literal_stop, result, row

@@ -1,0 +1,11 @@
+"""Two surfaces into one map: what stands for them in the search, what the search found, and how far to trust it.
+
+The stages below are put in order here, partial overlaps cut out, rivals compared, and every point given a confidence.
+"""
+
+from .alignment import Alignment
+from .pipeline import align
+from .prepared import Surface, prepare
+from .settings import AlignSettings
+
+__all__ = ["AlignSettings", "Alignment", "Surface", "align", "prepare"]

@@ -1,0 +1,223 @@
+"""What `align` returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ..bend.bend import Bending
+from ..flatten.flatten import Flattening
+from ..flatten.locate import TriangulatedDisc
+from ..mobius import Mobius
+from ..search.branch_and_bound import SearchResult
+from ..search.matching import Objective
+from ..search.rival import Rival
+from ..surface.cleaning import Cleaned
+from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from .confidence import evidence, probability
+from .objective import usual_difference
+from .overlap import Piece
+from .settings import AlignSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Two flattened surfaces and the transformation between their discs.
+
+    Attributes
+    ----------
+    mobius : Mobius
+        Carries the source's disc to the target's.
+    search : SearchResult
+        The certified search that found it; `mobius` may be refined beyond `search.mobius`.
+    source, target : Flattening
+    source_cleaned : Cleaned or None
+        How the source's triangles were put in order for the computation; None if they were taken as they are.
+    source_samples, target_samples : (N1,), (N2,) int
+        Vertices that stood for the surfaces in the search; `matches` index into these.
+    source_descriptors, target_descriptors : (n, d) float64
+        Standardised descriptors of all vertices.
+    objective : Objective
+        What was searched: the samples in the discs, match discs and weights.
+    settings : AlignSettings
+    bending : Bending or None
+        Where the target's vertices go in the source's disc when it is bent beyond `mobius`; None if it was not, or not
+        as a whole.
+    overlap : Overlap or None
+        The parts that both surfaces show, aligned by themselves; None if that is all of them, or was not asked.
+    counterpart : (n_target,) bool or None
+        Which target vertices have a counterpart on the source: those not beyond its boundary; None if it was not asked.
+    other : SearchResult or None
+        The search in the other orientation; None if only one was searched.
+    rival : Rival or None
+        The best transformation that maps everything elsewhere; None if it was not searched for.
+    taken : Rival or None
+        Which rival was gone on with in place of the search's best; None: the best.
+    seconds : dict of str to float
+        Wall-clock time per stage.
+    warnings : tuple of str
+        What the user should know, each a sentence.
+    """
+
+    mobius: Mobius
+    search: SearchResult
+    source: Flattening
+    target: Flattening
+    source_samples: Integers
+    target_samples: Integers
+    source_descriptors: Floats
+    target_descriptors: Floats
+    objective: Objective
+    settings: AlignSettings
+    bending: Bending | None = None
+    overlap: Overlap | None = None
+    counterpart: Booleans | None = None
+    other: SearchResult | None = None
+    rival: Rival | None = None
+    taken: Rival | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    source_cleaned: Cleaned | None = None
+
+    @property
+    def margin(self) -> float | None:
+        """By how much of the samples the chosen orientation beat the other; None if only one was searched."""
+        return None if self.other is None else (self.search.value - self.other.value) / len(self.source_samples)
+
+    @property
+    def rival_margin(self) -> float | None:
+        """By how much of the samples the winner beats whatever maps everything elsewhere, at least."""
+        if self.rival is None:
+            return None
+        return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
+
+    @property
+    def value(self) -> float:
+        """Q of the search's map that was gone on with."""
+        return (self.taken or self.search).value
+
+    @property
+    def matches(self) -> Integers:
+        """Its matches, (k, 2): rows of `source_samples` and `target_samples`."""
+        return (self.taken or self.search).matches
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is proved that no Möbius transformation of its orientation with |z| <= z_max has a larger Q."""
+        return self.taken is None and self.search.certified
+
+    @cached_property
+    def matched_weights(self) -> Floats:
+        """The weight, (N1,), with which each source sample matched; 0 where it did not."""
+        rows, columns = self.matches.T
+        result = np.zeros(len(self.source_samples))
+        result[rows] = self.objective.weights[rows, columns]
+        return result
+
+    @cached_property
+    def difference(self) -> float:
+        """By how much descriptors of points that belong together differ, from the samples that matched."""
+        rows, columns = self.matches.T
+        return usual_difference(
+            self.source_descriptors[self.source_samples[rows]], self.target_descriptors[self.target_samples[columns]]
+        )
+
+    @cached_property
+    def carried(self) -> Complexes:
+        """Where each target vertex goes in the source's disc, (n_target,); nan at vertices in no face."""
+        if self.bending is not None:
+            return self.bending.carried
+        if self.overlap is not None:
+            places = np.full(len(self.target.disc), complex(np.nan, np.nan))
+            face, barycentric = self.located
+            has = np.flatnonzero(face >= 0)
+            places[has] = (self.source.disc[self.source.mesh.faces[face[has]]] * barycentric[has]).sum(axis=1)
+            return places
+        places = self.target.disc.copy()
+        used = np.isfinite(places.real)
+        places[used] = self.mobius.inverse()(places[used])
+        return places
+
+    @cached_property
+    def evidence(self) -> Floats:
+        """What speaks against the map at each target vertex in use, (q, 7): see `confidence.evidence`."""
+        return evidence(
+            self.source,
+            self.target,
+            self.source_descriptors,
+            self.target_descriptors,
+            self.located,
+            self.carried,
+            1 - self.value / len(self.source_samples),
+            None if self.bending is None else (self.mobius, self.bending.offset),
+        )
+
+    @cached_property
+    def confidence(self) -> Floats:
+        """Probability that each target vertex errs by less than `confidence.BOUND`, (n_target,).
+
+        0 at vertices in no face, and at those that were found to have no counterpart.
+        """
+        result = np.zeros(len(self.target.disc))
+        if self.overlap is not None:
+            result[self.overlap.target.vertices] = self.overlap.alignment.confidence
+        else:
+            used = np.isfinite(self.target.disc.real)
+            result[used] = probability(self.evidence, bent=self.bending is not None)
+        if self.counterpart is not None:
+            result[~self.counterpart] = 0
+        return result
+
+    @property
+    def mean_confidence(self) -> float:
+        """Mean confidence, by area, where the map claims anything; 0 if that is nowhere."""
+        areas = self.target.mesh.vertex_areas * (self.confidence > 0)
+        return float(self.confidence @ areas / max(areas.sum(), np.finfo(float).tiny))
+
+    @cached_property
+    def located(self) -> tuple[Integers, Floats]:
+        """The source's face, (n_target,), and the barycentric coordinates in it, (n_target, 3), of each target vertex.
+
+        -1 and 0 at vertices in no face. Target vertices beyond the source's boundary are at the nearest point of it.
+        """
+        size = len(self.target.disc)
+        face, barycentric = np.full(size, -1), np.zeros((size, 3))
+        if self.overlap is None:
+            used = np.flatnonzero(np.isfinite(self.target.disc.real))
+            disc = TriangulatedDisc.of(self.source.disc, self.source.mesh.faces)
+            face[used], barycentric[used] = disc.locate(self.carried[used])
+            return face, barycentric
+        parts = self.overlap
+        inner, weights = parts.alignment.located
+        outside = np.setdiff1d(np.flatnonzero(np.isfinite(self.target.disc.real)), parts.target.vertices)
+        face[outside], barycentric[outside] = parts.nearest_face[outside], parts.nearest_barycentric[outside]
+        face[parts.target.vertices] = parts.source.faces[inner]
+        barycentric[parts.target.vertices] = weights
+        return face, barycentric
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """The parts that two surfaces have in common.
+
+    Attributes
+    ----------
+    alignment : Alignment
+        Of the two parts, as surfaces of their own.
+    source, target : Piece
+        What they are of the whole surfaces.
+    source_share, target_share : float
+        Of the whole surfaces' areas.
+    nearest_face, nearest_barycentric : (n_target,) int, (n_target, 3) float64
+        The point of the whole source next to each target vertex in the draft; what lies beyond is next to the boundary.
+    """
+
+    alignment: Alignment
+    source: Piece
+    target: Piece
+    source_share: float
+    target_share: float
+    nearest_face: Integers
+    nearest_barycentric: Floats

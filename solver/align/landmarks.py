@@ -1,0 +1,63 @@
+"""Pairs of points that the user knows, as weights in the same search: bad ones are outvoted like any other point."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..flatten.flatten import Flattening
+from ..surface.mesh import Complexes, Floats, Integers, plural
+
+REACH = 0.1
+"""Pseudo-hyperbolic radius within which a landmark counts as hit: twice what Möbius maps of scans err by, 0.03 roots of
+the area or 0.05 in the middle of the disc."""
+
+
+def usable_landmarks(pairs: npt.ArrayLike, source: Flattening, target: Flattening) -> tuple[Integers, list[str]]:
+    """Return the (source vertex, target vertex) rows that can be used, (l, 2), and warnings about the others.
+
+    Raises
+    ------
+    ValueError
+        Not of shape (l, 2), not whole numbers, or no vertices of these meshes.
+    """
+    given = np.asarray(pairs)
+    if given.size == 0:
+        return np.empty((0, 2), np.intp), []
+    if given.ndim != 2 or given.shape[1] != 2 or not np.issubdtype(given.dtype, np.integer):
+        raise ValueError(f"landmarks must be whole numbers of shape (l, 2), not {given.dtype} of shape {given.shape}")
+    for side, flattening in enumerate((source, target)):
+        column, count = given[:, side], len(flattening.disc)
+        if column.min() < 0 or column.max() >= count:
+            raise ValueError(
+                f"landmarks name vertices outside 0 to {count - 1} of '{flattening.mesh.name}' (the first is row "
+                f"{int(np.argmax((column < 0) | (column >= count)))})"
+            )
+    # nan compares false, so loose vertices drop out here too
+    inside = (np.abs(source.disc[given[:, 0]]) < 1 - 1e-9) & (np.abs(target.disc[given[:, 1]]) < 1 - 1e-9)
+    left_out = int((~inside).sum())
+    warnings = [f"{plural(left_out, 'landmark')} on a boundary or in no face left out"] if left_out else []
+    return given[inside].astype(np.intp), warnings
+
+
+def with_landmarks(
+    pairs: Integers, source: Complexes, target: Complexes, radius: Floats, weights: Floats
+) -> tuple[Integers, Floats, Floats]:
+    """Return the rows of `pairs` that join the source's points, (c,), and radii and weights with the landmarks in them.
+
+    The target's points are followed by one for each landmark. Together the landmarks weigh half as much as the other
+    source points: each joins as often as it takes.
+
+    Parameters
+    ----------
+    pairs : (l, 2) int
+    source, target : (N1,), (N2,) complex128
+        The other points.
+    radius, weights : (N2,), (N1, N2) float64
+    """
+    copies = max(1, round(len(source) / (2 * len(pairs))))
+    rows = np.repeat(np.arange(len(pairs)), copies)
+    table = np.zeros((len(source) + len(rows), len(target) + len(pairs)))
+    table[: len(source), : len(target)] = weights
+    table[len(source) + np.arange(len(rows)), len(target) + rows] = 1
+    return rows, np.concatenate([radius, np.full(len(pairs), REACH)]), table

@@ -1,0 +1,160 @@
+"""Two surfaces, flattened, searched for the best Möbius transformation, and this refined on all vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ..mobius import Mobius
+from ..search.branch_and_bound import SearchResult, search
+from ..search.matching import Objective
+from ..search.rival import Rival, best_rival
+from ..stages import Cancelled, Part
+from .alignment import Alignment
+from .landmarks import usable_landmarks, with_landmarks
+from .objective import compatibility, covering_radius
+from .prepared import Surface
+from .refine import refined
+from .settings import AlignSettings
+
+
+def roughly_aligned(
+    source_surface: Surface,
+    target_surface: Surface,
+    settings: AlignSettings,
+    clock: Part,
+    landmarks: npt.ArrayLike | None,
+) -> Alignment:
+    """Flatten, search, and refine the transformation; of prepared surfaces the rest is there already."""
+    clock.begin("flatten source", "Flattening the source", 0.0)
+    source = source_surface.flattening
+    clock.begin("flatten target", "Flattening the target", 0.1)
+    target = target_surface.flattening
+    clock.begin("descriptors", "Measuring curvature", 0.2)
+    source_descriptors = source_surface.descriptors(clock.within(0.2, 0.25))
+    target_descriptors = target_surface.descriptors(clock.within(0.25, 0.3))
+    clock.begin("sampling", "Choosing points", 0.3)
+    source_samples = source_surface.source_points(settings.samples)
+    target_samples = target_surface.target_points(settings.targets, clock.within(0.3, 0.4))
+    problem = Objective(
+        source.disc[source_samples],
+        target.disc[target_samples],
+        covering_radius(target.disc[target_samples])
+        if settings.radius is None
+        else np.full(len(target_samples), settings.radius),
+        compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
+    )
+    pairs, warnings = usable_landmarks(() if landmarks is None else landmarks, source, target)
+    if len(pairs):
+        rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
+        source_samples = np.concatenate([source_samples, pairs[rows, 0]])
+        target_samples = np.concatenate([target_samples, pairs[:, 1]])
+        problem = Objective(source.disc[source_samples], target.disc[target_samples], radius, weights)
+    found, other, said = _searched(problem, settings, clock)
+    warnings += said
+    warnings += unproved(found)
+    alignment = Alignment(
+        mobius=found.mobius,
+        search=found,
+        source=source,
+        target=target,
+        source_samples=source_samples,
+        target_samples=target_samples,
+        source_descriptors=source_descriptors,
+        target_descriptors=target_descriptors,
+        objective=problem,
+        settings=settings,
+        other=other,
+        source_cleaned=source_surface.cleaned,
+    )
+    clock.begin("rival", "Looking for a rival", 0.75)
+    near = settings.reflect_margin * len(source_samples)
+    rival = rival_of(alignment, [found.mobius], found.value - near, clock)
+    if rival.value >= found.value - near:
+        warnings.append(
+            f"ambiguous: a map that sends everything elsewhere scores within "
+            f"{100 * max(found.value - rival.value, 0) / len(source_samples):.1f} % of the samples of the best; is the "
+            "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
+        )
+    alignment = replace(alignment, rival=rival, warnings=tuple(warnings))
+    clock.begin("refine", "Refining", 0.9)
+    return taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
+
+
+def unproved(found: SearchResult) -> list[str]:
+    """Say it if a search ran out of time before its proof."""
+    if found.certified:
+        return []
+    share = 100 * found.gap / max(found.upper_bound, 1e-300)
+    return [f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"]
+
+
+def rival_of(found: Alignment, known: list[Mobius], enough: float | None, clock: Part) -> Rival:
+    """Look for the best transformation that maps everything elsewhere than those known."""
+    rival = best_rival(
+        found.objective,
+        known,
+        z_max=found.settings.z_max,
+        enough=enough,
+        time_limit=found.settings.time_limit,
+        progress=clock.searching(0.15),
+    )
+    if rival is None:
+        raise Cancelled
+    return rival
+
+
+def taking(found: Alignment, rival: Rival | None, tell: Callable[[float], None]) -> Alignment:
+    """Go on with a rival, or with the best if that is None: refine it on all vertices."""
+    found = replace(found, taken=rival, mobius=(rival or found.search).mobius)
+    if found.settings.refine == "none":
+        return found
+    descriptors = found.source_descriptors, found.target_descriptors
+    mobius = refined(found.mobius, found.source, found.target, *descriptors, found.difference, tell)
+    return replace(found, mobius=mobius)
+
+
+def _searched(
+    problem: Objective, settings: AlignSettings, clock: Part
+) -> tuple[SearchResult, SearchResult | None, list[str]]:
+    """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""
+    results: dict[bool, SearchResult] = {}
+    sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
+    for position, reflected in enumerate(sides):
+        begin = 0.4 + 0.35 * position / len(sides)
+        clock.begin(
+            "search reflected" if reflected else "search",
+            "Searching the reflection" if reflected else "Searching",
+            begin,
+        )
+        result = search(
+            np.conj(problem.source) if reflected else problem.source,
+            problem.target,
+            problem.radius,
+            weights=problem.weights,
+            z_max=settings.z_max,
+            time_limit=settings.time_limit,
+            progress=clock.searching(0.35 / len(sides)),
+        )
+        if result.cancelled:
+            raise Cancelled
+        results[reflected] = _mirrored(result) if reflected else result
+    if len(results) == 1:
+        return results[sides[0]], None, []
+    advantage = (results[True].value - results[False].value) / len(problem.source)
+    chosen = advantage > settings.reflect_margin
+    warnings = []
+    if abs(advantage) <= settings.reflect_margin:
+        warnings.append(
+            f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
+            "taken as not mirrored"
+        )
+    return results[chosen], results[not chosen], warnings
+
+
+def _mirrored(result: SearchResult) -> SearchResult:
+    """Return the result of a search on the conjugated source as one on the source itself."""
+    return replace(result, mobius=Mobius(result.mobius.z, result.mobius.theta, True))

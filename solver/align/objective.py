@@ -1,0 +1,56 @@
+"""The objective that `align` gives the search: which points stand for the surfaces, and which pairs may match."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..flatten.flatten import Flattening
+from ..mobius import hyperbolic_distance
+from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.sampling import HORIZON, extrema, farthest_points
+
+
+def compatibility(source: Floats, target: Floats, share: float) -> Floats:
+    """Return the weight, (N1, N2), of each pair of descriptors, from how rare it is to be so alike.
+
+    1 - p / share, at least 0, where p is the share of the target that is more like the source point. So weights need no
+    unit of likeness: whatever the noise, each source point may match as much of the target.
+    """
+    square = (source**2).sum(axis=1)[:, None] + (target**2).sum(axis=1) - 2 * source @ target.T
+    rank = np.empty(square.shape)
+    np.put_along_axis(rank, np.argsort(square, axis=1, kind="stable"), 0.5 + np.arange(square.shape[1])[None], axis=1)
+    return np.maximum(1 - rank / (share * square.shape[1]), 0)
+
+
+def usual_difference(source: Floats, target: Floats) -> float:
+    """Return the median distance of matched descriptors, (m, d) each: how alike these two surfaces are.
+
+    At least a tenth of what their standard deviation makes of it; the standard deviation itself where nothing matched.
+    """
+    most = float(np.sqrt(source.shape[1]))
+    if not len(source):
+        return most
+    return max(float(np.median(np.linalg.norm(source - target, axis=1))), 0.1 * most)
+
+
+def covering_radius(points: Complexes) -> Floats:
+    """Return each point's pseudo-hyperbolic distance to its second nearest neighbour, (n,), at most 0.5.
+
+    Discs of these radii around evenly spread points cover the region between them.
+    """
+    distance = hyperbolic_distance(points[:, None], points)
+    return np.clip(np.sort(distance, axis=1)[:, min(2, len(points) - 1)], 1e-6, 0.5)
+
+
+def interior(flattening: Flattening) -> Booleans:
+    """Return which vertices, (n,), are in use and far enough inside the disc for the search."""
+    inside = np.isfinite(flattening.disc.real) & (np.abs(flattening.disc) < HORIZON)
+    inside[flattening.boundary] = False
+    return inside
+
+
+def source_points(flattening: Flattening, descriptors: Floats, count: int) -> Integers:
+    """Return the source points: up to half of them extrema of curvature, the others far from these and each other."""
+    inside = interior(flattening)
+    peaks = extrema(flattening.mesh, descriptors[:, 1], inside)[: count // 2]
+    return farthest_points(flattening.mesh, count, peaks, inside)

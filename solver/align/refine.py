@@ -1,0 +1,155 @@
+"""The Möbius transformation improved on all vertices: where the descriptors of the two surfaces agree best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..flatten.flatten import Flattening
+from ..flatten.locate import TriangulatedDisc
+from ..mobius import Mobius
+from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.sampling import HORIZON
+
+MOST_VERTICES = 3000
+"""Of larger sources every so many-th vertex is used: three parameters need no more."""
+
+
+def refined(
+    mobius: Mobius,
+    source: Flattening,
+    target: Flattening,
+    source_descriptors: Floats,
+    target_descriptors: Floats,
+    scale: float,
+    progress: Callable[[float], None] | None = None,
+) -> Mobius:
+    """Return the transformation near `mobius` at which the descriptors of all vertices agree best.
+
+    Maximises the area-weighted sum over source vertices of exp(-|d_j - d(f(m_j))|^2 / (2 scale^2)), d on the target
+    linear in each triangle, by Gauss and Newton's method with Levenberg's damping; the Gaussian makes it the robust
+    (Welsch) fit, so each step weighs a vertex by the term it contributes.
+
+    Parameters
+    ----------
+    mobius : Mobius
+        Where to begin.
+    source, target : Flattening
+    source_descriptors, target_descriptors : (n, d) float64
+        Standardised descriptors of the vertices.
+    scale : float
+        Standard deviation of the Gaussian.
+    progress : callable, optional
+        Called before each evaluation with a share of the work, in [0, 1]; may raise to end it.
+    """
+    used = np.flatnonzero(np.isfinite(source.disc.real))
+    used = used[:: -(-len(used) // MOST_VERTICES)]
+    share = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
+    disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
+    slopes = _slopes(target.disc, target.mesh.faces, target_descriptors)
+    depth: Floats = 1.0 - np.abs(source.disc[used]).astype(np.float64)
+    stages = _stages(depth, share)
+    for number, seen in enumerate(stages):
+        chosen = used[seen]
+        mobius = _improved(
+            mobius,
+            source.disc[chosen],
+            source_descriptors[chosen],
+            share[seen],
+            disc,
+            target_descriptors,
+            slopes,
+            scale,
+            None if progress is None else lambda done, n=number: progress((n + done) / len(stages)),
+        )
+    return mobius
+
+
+def _stages(depth: Floats, share: Floats) -> list[Integers]:
+    """Return the points to use one stage after another, the last time all: (k,) int each.
+
+    The nearer a point lies to the rim, the farther it moves for a small change of the transformation, so what is far
+    inside comes first and brings the rest into reach. There is one stage where less than a hundredth of the area lies
+    outside the search's horizon: surfaces about as wide as long.
+
+    Parameters
+    ----------
+    depth : (n,) float64
+        Distance of each point from the rim.
+    share : (n,) float64
+        Of the area.
+    """
+    stages, reach = [], 1 - HORIZON
+    inside = depth > 1e-9  # the boundary's own vertices are only in the last stage
+    while share[inside & (depth < reach)].sum() > 0.01:
+        stages.append(np.flatnonzero(depth >= reach))
+        reach /= 4
+    return [*stages, np.arange(len(depth))]
+
+
+def _improved(
+    mobius: Mobius,
+    points: Complexes,
+    expected: Floats,
+    weights: Floats,
+    disc: TriangulatedDisc,
+    target_descriptors: Floats,
+    slopes: Complexes,
+    scale: float,
+    progress: Callable[[float], None] | None,
+) -> Mobius:
+    """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
+    faces = disc.faces
+
+    def agreement(trial: Mobius) -> tuple[float, Complexes, Integers, Floats, Floats]:
+        place = trial(points)
+        face, barycentric = disc.locate(place)
+        residual = expected - np.einsum("qk,qkd->qd", barycentric, target_descriptors[faces[face]])
+        term = weights * np.exp(-(residual**2).sum(axis=1) / (2 * scale**2))
+        return float(term.sum()), place, face, residual, term
+
+    value, place, face, residual, term = agreement(mobius)
+    damping = 1e-4
+    for step_number in range(30):
+        # the transformations next to the identity move x by a - conj(a) x^2 + i t x
+        moves = np.stack([1 - place**2, 1j * (1 + place**2), 1j * place], axis=1)
+        slope = slopes[face]
+        jacobian = np.einsum("qd,qp->qdp", slope.real, moves.real) + np.einsum("qd,qp->qdp", slope.imag, moves.imag)
+        weighted = jacobian * term[:, None, None]
+        normal = np.einsum("qdp,qdr->pr", weighted, jacobian)
+        force = np.einsum("qdp,qd->p", weighted, residual)
+        while damping < 1e6:
+            if progress:
+                progress(step_number / 30)
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), force)
+            step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
+            trial = _small(step) @ mobius
+            found = agreement(trial)
+            if found[0] > value:
+                break
+            damping *= 10
+        else:
+            return mobius
+        gain = found[0] - value
+        mobius, damping = trial, max(damping / 10, 1e-6)
+        value, place, face, residual, term = found
+        if gain < 1e-5 * value:
+            break
+    return mobius
+
+
+def _slopes(points: Complexes, faces: Integers, values: Floats) -> Complexes:
+    """Return the gradient of values that are linear in each triangle, (m, d): along x and y as real and imaginary."""
+    corner = points[faces]
+    opposite = corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]]
+    twice_area = np.imag(np.conj(corner[:, 1] - corner[:, 0]) * (corner[:, 2] - corner[:, 0]))
+    # the gradient of a corner's hat function is its opposite side turned by a right angle, over twice the area
+    hat = 1j * opposite / np.where(twice_area > 0, twice_area, np.inf)[:, None]
+    return np.einsum("mk,mkd->md", hat, values[faces])
+
+
+def _small(step: Floats) -> Mobius:
+    """Return the transformation that moves x by a - conj(a) x^2 + i t x, nearly, for step (re a, im a, t)."""
+    a, turn = complex(step[0], step[1]), float(step[2])
+    return Mobius(-a, turn)

@@ -1,0 +1,71 @@
+"""What `align` can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AlignSettings:
+    """What `align` can be told; the defaults suit scans of one kind of object.
+
+    Attributes
+    ----------
+    samples : int
+        Source points of the search.
+    targets : int
+        Target points of the search; the match discs around them cover the target.
+    radius : float, optional
+        Hyperbolic radius of the match discs, in (0, 1). Default: each point's distance to its second nearest neighbour.
+    z_max : float
+        Bound on |z|, in (0, 1): how far the centres of the two discs may lie apart.
+    compatible : float
+        Share of the target that a source point may match, in (0, 1]: what is most like it. On 7 sets of pairs 87 to
+        98 % of the counterparts are within 0.2, and beyond they are no likelier than chance (`tests/bench/ranks.py`).
+    reflect : str
+        "never", "always" or "auto": both orientations are searched; the reflected one is taken where it wins clearly
+        and, with dense refinement, no map that is not reflected fits.
+    reflect_margin : float
+        Share of the samples by which a reflection has to win, and below which an orientation, or a rival that maps
+        everything elsewhere, is called ambiguous. On 8 pairs of nearly mirror symmetric faces the orientations
+        differ by at most 0.02, on 8 pairs of teeth the right one wins by at least 0.10; rivals lie 0.14 or more below
+        the winner on all 16, at most 0.013 on sheets with a rotational symmetry.
+    take_rival : bool
+        Continue with the best rival in place of the winner, where the winner is the wrong one of an ambiguous pair.
+    time_limit : float, optional
+        Seconds for each search.
+    refine : str
+        "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
+        the source, smoothly and without folds.
+    fill_holes : bool
+        Allow meshes with openings: all boundary loops but the outer one are closed for the computation.
+    source_outer, target_outer : int, optional
+        A vertex on the loop that is to be the outer one; by default the longest loop is.
+    """
+
+    samples: int = 100
+    targets: int = 1000
+    radius: float | None = None
+    z_max: float = 0.8337  # tanh(1.2)
+    compatible: float = 0.2
+    reflect: str = "auto"
+    reflect_margin: float = 0.06
+    take_rival: bool = False
+    time_limit: float | None = 60.0
+    refine: str = "dense"
+    fill_holes: bool = False
+    source_outer: int | None = None
+    target_outer: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius", "dense"))):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{getattr(self, name)}'")
+        if self.samples < 3 or self.targets < 3:
+            raise ValueError("samples and targets must be at least 3: a Möbius transformation has three parameters")
+        if not 0 < self.z_max < 1:
+            raise ValueError(f"z_max must lie between 0 and 1, not {self.z_max}")
+        if self.radius is not None and not 0 < self.radius < 1:
+            raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
+        if not 0 < self.compatible <= 1:
+            raise ValueError(f"compatible must be a share above 0 and at most 1, not {self.compatible}")

@@ -1,0 +1,63 @@
+"""What a finished alignment says about itself, as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from ..align.alignment import Alignment
+from ..mobius import Mobius
+from .correspond import Correspondence
+
+
+def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, Any]:
+    """Return the figures of an alignment as JSON-ready data: what was matched, what is proved, how long it took.
+
+    `coverage` is the share of the target's area whose vertices are matched. `value` to `rival` are about the whole
+    discs, `overlap` about the parts that both surfaces show, where these are less; `rival_margin` is the latter's then.
+    """
+    found, areas, parts = alignment.search, alignment.target.mesh.vertex_areas, alignment.overlap
+    decisive = alignment if parts is None else parts.alignment
+    return {
+        "source": alignment.source.mesh.name,
+        "target": alignment.target.mesh.name,
+        "value": alignment.value,
+        "upper_bound": found.upper_bound,
+        "gap": found.upper_bound - alignment.value,
+        "certified": alignment.certified,
+        "rival_taken": alignment.taken is not None,
+        "certified_for": f"|z| <= {alignment.settings.z_max:.4f}",
+        "samples": len(alignment.source_samples),
+        "targets": len(alignment.target_samples),
+        "matches": len(alignment.matches),
+        "nodes": found.nodes,
+        "mobius": _plain(alignment.mobius),
+        "orientation_margin": alignment.margin,
+        "rival": None
+        if alignment.rival is None
+        else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
+        "rival_margin": decisive.rival_margin,
+        "overlap": None
+        if parts is None
+        else {
+            "source_share": parts.source_share,
+            "target_share": parts.target_share,
+            "value": decisive.value,
+            "upper_bound": decisive.search.upper_bound,
+            "certified": decisive.certified,
+            "samples": len(decisive.source_samples),
+            "matches": len(decisive.matches),
+        },
+        "vertices_unfolded": None if decisive.bending is None else decisive.bending.repaired,
+        "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
+        "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
+        "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
+        "flips_repaired": {"source": alignment.source.flips_repaired, "target": alignment.target.flips_repaired},
+        "seconds": dict(alignment.seconds),
+        "settings": asdict(alignment.settings),
+        "warnings": list(alignment.warnings),
+    }
+
+
+def _plain(mobius: Mobius) -> dict[str, Any]:
+    return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}

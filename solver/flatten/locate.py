@@ -1,0 +1,121 @@
+"""Point location in a triangulated disc: the triangle that holds each point, and its barycentric coordinates there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..surface.mesh import Complexes, Floats, Integers, face_neighbours
+
+
+@dataclass(frozen=True, eq=False)
+class TriangulatedDisc:
+    """A triangulation of the unit disc, prepared for point location.
+
+    Attributes
+    ----------
+    points : (n,) complex128
+        nan where a vertex is in no face.
+    faces : (m, 3) int
+        Counter-clockwise triangles.
+    neighbours : (m, 3) int
+        The face across the side opposite each corner; -1 on the boundary.
+    """
+
+    points: Complexes
+    faces: Integers
+    neighbours: Integers
+    _tree: KDTree
+    _face_of_leaf: Integers
+
+    @staticmethod
+    def of(points: Complexes, faces: Integers) -> TriangulatedDisc:
+        """Prepare the triangulation with these points, (n,), and faces, (m, 3)."""
+        used, first = np.unique(faces.ravel(), return_index=True)
+        tree = KDTree(_plane(points[used]))
+        return TriangulatedDisc(points, faces, face_neighbours(faces, len(points)), tree, first // 3)
+
+    def locate(self, queries: Complexes) -> tuple[Integers, Floats]:
+        """Return the face, (q,), that holds each query and the barycentric coordinates, (q, 3), in it.
+
+        A query outside the triangulation (between the circle and the polygon inscribed in it) gets the nearest point of
+        the boundary side it lies beyond.
+        """
+        face = self._face_of_leaf[self._tree.query(_plane(queries))[1]]
+        inside = np.zeros(len(queries), bool)
+        open_queries = np.arange(len(queries))
+        previous = np.full(len(queries), -1)
+        # a walk across the side that the query lies farthest behind; each step is a step nearer in a convex domain
+        for _ in range(4 * int(np.sqrt(len(self.faces))) + 100):
+            here = face[open_queries]
+            sides = self._side_areas(here, queries[open_queries])
+            blocked = (self.neighbours[here] < 0) | (self.neighbours[here] == previous[open_queries, None])
+            behind = np.where(blocked, 0.0, sides)
+            corner = np.argmin(behind, axis=1)
+            done = behind[np.arange(len(here)), corner] >= 0
+            inside[open_queries[done]] = True
+            moving = open_queries[~done]
+            if len(moving) == 0:
+                break
+            previous[moving] = face[moving]
+            face[moving] = self.neighbours[face[moving], corner[~done]]
+            open_queries = moving
+        strays = np.flatnonzero(~inside | (self.barycentric(face, queries).min(axis=1) < -1e-6))
+        if len(strays):
+            face[strays] = self._nearest_face(queries[strays])
+        return face, self._clamped(face, queries)
+
+    def barycentric(self, face: Integers, queries: Complexes) -> Floats:
+        """Return barycentric coordinates, (q, 3), of queries in given faces; negative outside; thirds without area."""
+        sides = self._side_areas(face, queries)
+        total = sides.sum(axis=1, keepdims=True)
+        return np.divide(sides, total, out=np.full_like(sides, 1 / 3), where=np.abs(total) > 0)
+
+    def _side_areas(self, face: Integers, queries: Complexes) -> Floats:
+        # in rows of their own: numpy multiplies strided complex numbers in one of two ways, by what lies beside them in
+        # memory, and these differ in the last bit
+        a, b, c = np.ascontiguousarray(self.points[self.faces[face]].T) - queries
+        return np.stack([np.imag(np.conj(b) * c), np.imag(np.conj(c) * a), np.imag(np.conj(a) * b)], axis=1)
+
+    def _nearest_face(self, queries: Complexes, candidates: int = 24) -> Integers:
+        """Return the face nearest to each query among those around the nearest vertices."""
+        k = min(candidates, self._tree.n)
+        near = np.asarray(self._tree.query(_plane(queries), k=k)[1]).reshape(len(queries), k)
+        start = self._face_of_leaf[near]
+        best, best_distance = start[:, 0].copy(), np.full(len(queries), np.inf)
+        tried = np.concatenate([start, self.neighbours[start].reshape(len(queries), -1)], axis=1)
+        for column in tried.T:
+            face = np.where(column < 0, start[:, 0], column)
+            weights = self._clamped(face, queries)
+            distance = np.abs((self.points[self.faces[face]] * weights).sum(axis=1) - queries)
+            nearer = distance < best_distance
+            best[nearer], best_distance[nearer] = face[nearer], distance[nearer]
+        return best
+
+    def _clamped(self, face: Integers, queries: Complexes) -> Floats:
+        """Return the barycentric coordinates of the point of each face nearest to its query."""
+        weights = self.barycentric(face, queries)
+        outside = np.flatnonzero((weights < 0).any(axis=1))
+        if len(outside):
+            corners, x = self.points[self.faces[face[outside]]], queries[outside]
+            best = np.full(len(outside), np.inf)
+            nearest = weights[outside]
+            for k in range(3):
+                start, side = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+                square = np.abs(side) ** 2
+                along = np.divide(np.real(np.conj(side) * (x - start)), square, out=np.zeros(len(x)), where=square > 0)
+                along = np.clip(along, 0, 1)
+                distance = np.abs(start + along * side - x)
+                better = distance < best
+                best[better] = distance[better]
+                row = np.zeros((len(x), 3))
+                row[:, k], row[:, (k + 1) % 3] = 1 - along, along
+                nearest[better] = row[better]
+            weights[outside] = nearest
+        return weights
+
+
+def _plane(points: Complexes) -> Floats:
+    return np.stack([points.real, points.imag], axis=1)

@@ -1,0 +1,9 @@
+"""The certified search: the Möbius transformation that brings most of the source into match discs of the target.
+
+Branch and bound over all transformations with |z| <= z_max, ending with a bound that holds in floating-point
+arithmetic; knows points of two discs and nothing of surfaces (Le, Chin and Suter 2016).
+"""
+
+from .branch_and_bound import SearchResult, search
+
+__all__ = ["SearchResult", "search"]

@@ -1,0 +1,10 @@
+"""What a triangle mesh is: its topology and flaws, its intrinsic operators, and points and curvatures on it.
+
+The stages above ask here for everything that concerns one surface as it lies in space, before any map of it.
+"""
+
+from .cleaning import Cleaned, cleaned
+from .mesh import MeshError, TriangleMesh
+from .topology import Topology, require_disc, topology
+
+__all__ = ["Cleaned", "MeshError", "Topology", "TriangleMesh", "cleaned", "require_disc", "topology"]

@@ -1,0 +1,178 @@
+"""Nearest points on a surface, by position and by position and normal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from .mesh import Booleans, Floats, Integers, TriangleMesh, face_neighbours
+
+SUITABLE = 2
+"""Samples around whose faces `SurfacePoints.most_alike` looks."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """A surface prepared for queries with a position and a unit normal.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+    loops : tuple of (k,) int
+        The vertices of its boundaries in order.
+    normal_weight : float
+        Length that counts as much as a difference of 1 between unit normals.
+    """
+
+    mesh: TriangleMesh
+    loops: tuple[Integers, ...]
+    normal_weight: float
+
+    @cached_property
+    def _normals(self) -> Floats:
+        return self.mesh.vertex_normals()
+
+    @cached_property
+    def _features(self) -> Floats:
+        """Position and weighted normal of each vertex, (n, 6)."""
+        return np.hstack([self.mesh.vertices, self.normal_weight * self._normals])
+
+    @cached_property
+    def _tree(self) -> tuple[KDTree, Integers]:
+        """The vertices in use and the faces' centres, with positions and weighted unit normals; a face of each."""
+        features = self._features
+        used, first = np.unique(self.mesh.faces.ravel(), return_index=True)
+        centres = features[self.mesh.faces].mean(axis=1)
+        length = np.linalg.norm(centres[:, 3:], axis=1, keepdims=True)
+        centres[:, 3:] *= self.normal_weight / np.maximum(length, np.finfo(float).tiny)
+        return KDTree(np.concatenate([features[used], centres])), np.concatenate(
+            [first // 3, np.arange(len(self.mesh.faces))]
+        )
+
+    @cached_property
+    def _neighbours(self) -> Integers:
+        return face_neighbours(self.mesh.faces, len(self.mesh.vertices))
+
+    @cached_property
+    def _on_rim(self) -> Booleans:
+        rim = np.zeros(len(self.mesh.vertices), bool)
+        rim[np.concatenate(self.loops)] = True
+        return rim
+
+    @cached_property
+    def _rim(self) -> tuple[KDTree, Floats, Floats]:
+        """Points along the boundaries' edges, four to each, and the unit vectors along them."""
+        start = self.mesh.vertices[np.concatenate(self.loops)]
+        side = self.mesh.vertices[np.concatenate([np.roll(loop, -1) for loop in self.loops])] - start
+        points = np.concatenate([start + share * side for share in (0.0, 0.25, 0.5, 0.75)])
+        return KDTree(points), points, np.tile(_unit(side), (4, 1))
+
+    def nearest_on_boundary(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the boundary's nearest point and its unit tangent there, (q, 3) each; to a quarter of an edge."""
+        tree, at, along = self._rim
+        found = tree.query(points)[1]
+        tangent = along[found]
+        ahead = ((points - at[found]) * tangent).sum(axis=1)
+        return at[found] + ahead[:, None] * tangent, tangent
+
+    def nearest_point(
+        self, points: Floats, normals: Floats, samples: int = 6, progress: Callable[[float], None] | None = None
+    ) -> tuple[Integers, Floats]:
+        """Return the face, (q,), and barycentric coordinates, (q, 3), of the nearest point of the surface.
+
+        Looked for in the faces of the samples that suit each query best in position and normal, and next to them.
+        Samples are the vertices and the faces' centres. `progress` is called with the share of the work done, in
+        [0, 1], and may raise to end it.
+        """
+        near = self._near(points, normals, samples)
+        faces = np.concatenate([near, self._around(near[:, :2])], axis=1)
+        return self._nearest_among(faces, points, self.mesh.vertices, progress)
+
+    def most_alike(self, points: Floats, normals: Floats) -> tuple[Integers, Floats]:
+        """Return the face, (q,), and barycentric coordinates, (q, 3), of the point that suits each query best.
+
+        In position and normal together: the coordinates of a space of six dimensions, normals times `normal_weight`.
+        There the surface consists of triangles too, with normals linear in each.
+        """
+        near = self._near(points, normals, SUITABLE)
+        faces = np.concatenate([near, self._around(near[:, :1])], axis=1)
+        query = np.hstack([points, self.normal_weight * normals])
+        return self._nearest_among(faces, query, self._features)
+
+    def at(self, face: Integers, barycentric: Floats) -> tuple[Floats, Floats, Booleans]:
+        """Return points of the surface: position, (q, 3), unit normal, (q, 3), and whether on a boundary, (q,)."""
+        corners = self.mesh.faces[face]
+        beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
+        position, normal = (
+            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self._normals)
+        )
+        return position, _unit(normal), beyond
+
+    def _near(self, points: Floats, normals: Floats, samples: int) -> Integers:
+        """Return the faces, (q, samples), of the samples that suit each query best; fewer if there are fewer."""
+        tree, face_of_sample = self._tree
+        count = min(samples, len(face_of_sample))
+        found = tree.query(np.hstack([points, self.normal_weight * normals]), k=count, workers=-1)[1]
+        return face_of_sample[np.asarray(found).reshape(len(points), count)]
+
+    def _around(self, faces: Integers) -> Integers:
+        """Return the faces next to faces, (q, k), as (q, 3 k); beyond a boundary the first again."""
+        around = self._neighbours[faces].reshape(len(faces), -1)
+        return np.where(around < 0, faces[:, :1], around)
+
+    def _nearest_among(
+        self, faces: Integers, points: Floats, places: Floats, progress: Callable[[float], None] | None = None
+    ) -> tuple[Integers, Floats]:
+        """Return which of the faces, (q, k), is nearest to each point, (q, d), and where, with vertices at `places`."""
+        face, best = faces[:, 0].copy(), np.full(len(points), np.inf)
+        barycentric = np.zeros((len(points), 3))
+        for k, column in enumerate(faces.T):
+            if progress:
+                progress(k / faces.shape[1])
+            corners = places[self.mesh.faces[column]]
+            weights = nearest_in_triangle(points, corners)
+            apart = np.einsum("qk,qkd->qd", weights, corners) - points
+            distance = _dot(apart, apart)
+            nearer = distance < best
+            face[nearer], best[nearer], barycentric[nearer] = column[nearer], distance[nearer], weights[nearer]
+        return face, barycentric
+
+
+def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:
+    """Return barycentric coordinates, (q, 3), of the point of each triangle, (q, 3, d), nearest to a point, (q, d)."""
+    b, c, p = (x - corners[:, 0] for x in (corners[:, 1], corners[:, 2], points))
+    bb, bc, cc, pb, pc = _dot(b, b), _dot(b, c), _dot(c, c), _dot(p, b), _dot(p, c)
+    square = bb * cc - bc**2
+    square = np.where(square > 0, square, np.inf)
+    v, w = (cc * pb - bc * pc) / square, (bb * pc - bc * pb) / square
+    weights = np.stack([1 - v - w, v, w], axis=1)
+    outside = np.flatnonzero((weights[:, 0] < 0) | (v < 0) | (w < 0) | ~np.isfinite(square))
+    points, corners = points[outside], corners[outside]
+    best = np.full(len(outside), np.inf)
+    nearest = np.zeros((len(outside), 3))
+    for k in range(3):  # the nearest point of each side
+        start = corners[:, k]
+        side = corners[:, (k + 1) % 3] - start
+        length = np.maximum(_dot(side, side), np.finfo(float).tiny)
+        along = np.clip(_dot(points - start, side) / length, 0, 1)
+        apart = start + along[:, None] * side - points
+        distance = _dot(apart, apart)
+        nearer = distance < best
+        best[nearer] = distance[nearer]
+        nearest[nearer, k], nearest[nearer, (k + 1) % 3], nearest[nearer, k - 1] = 1 - along[nearer], along[nearer], 0
+    weights[outside] = nearest
+    return weights
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Return the dot product of each row, (n,), of two (n, d)."""
+    return np.einsum("ij,ij->i", a, b)
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Return the vectors, (n, d), in unit length; zero ones stay."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
