@@ -1,8 +1,10 @@
-"""Files that commands write: refused before any work where they cannot be, and what they cannot hold said after it."""
+"""Files that commands write: refused before any work where they cannot be, and what is to be said of them."""
 
 from __future__ import annotations
 
+import argparse
 import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,20 +15,67 @@ if TYPE_CHECKING:
     from ..files import Imported
 
 
-def require_writable(meshes: Iterable[Path] = (), others: Iterable[Path | None] = ()) -> None:
-    """Raise `Unreadable` before any work if an output cannot be written."""
-    from ..files import Unreadable, format_of
+def add_output_options(parser: argparse.ArgumentParser, help_text: str) -> None:
+    """Add where a mesh file goes, and whether it may take an input's place."""
+    parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help=help_text)
+    parser.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="allow OUT to be a file that is read; of a .blend the old one stays as .blend1",
+    )
+
+
+def require_writable(
+    meshes: Iterable[Path] = (),
+    others: Iterable[Path | None] = (),
+    *,
+    inputs: Iterable[Path | str | None] = (),
+    overwrite: bool = False,
+) -> None:
+    """Make sure, before any work, that outputs can be written and take no input's place.
+
+    Parameters
+    ----------
+    meshes, others : iterable of Path
+        Mesh files, and other files, to write.
+    inputs : iterable of Path or str
+        Files that are read; a str may name an object in one.
+    overwrite : bool
+        A mesh file may be an input.
+
+    Raises
+    ------
+    Unreadable
+        One cannot be written.
+    """
+    from ..files import Unreadable, format_of, real_place, split_object_name, temporary_folder
 
     meshes, others = list(meshes), [path for path in others if path is not None]
+    read = {real_place(split_object_name(x)[0] if isinstance(x, str) else x) for x in inputs if x is not None}
     for path in meshes:
         format_of(path)
     for path in [*meshes, *others]:
-        if path.is_dir():
+        place = real_place(path)
+        if place.is_dir():
             raise Unreadable(f"'{path}' is a folder: name a file to write")
-        if not path.resolve().parent.is_dir():
+        if place.is_symlink() or (place.exists() and not place.is_file()):
+            raise Unreadable(f"'{path}' is no file that can be replaced: name another one")
+        if not place.parent.is_dir():
             raise Unreadable(f"there is no folder '{path.parent}' to write '{path.name}' in")
-    if len({path.resolve() for path in [*meshes, *others]}) < len(meshes) + len(others):
+        if place.exists() and not os.access(place, os.W_OK):
+            raise Unreadable(f"'{path}' is write-protected: name another file, or allow writing")
+        if place in read and path in others:
+            raise Unreadable(f"'{path}' is read by this command: name another file to write")
+        if place in read and not overwrite:
+            raise Unreadable(f"'{path}' is read by this command: name another file, or say --overwrite")
+    if len({real_place(path) for path in [*meshes, *others]}) < len(meshes) + len(others):
         raise Unreadable("two outputs have the same name")
+    for folder in {real_place(path).parent for path in [*meshes, *others]}:
+        try:
+            with temporary_folder(folder):
+                pass
+        except OSError as error:
+            raise Unreadable(f"nothing can be written in the folder '{folder}' ({error.strerror})") from error
 
 
 def write_report(path: Path, figures: dict[str, Any]) -> None:
@@ -34,19 +83,20 @@ def write_report(path: Path, figures: dict[str, Any]) -> None:
     path.write_text(json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def warn_of_losses(path: Path, kinds: Iterable[str]) -> None:
-    """Say what a file of this kind cannot hold."""
-    from ..attributes import KINDS
-    from ..files import format_of
+def is_input(output: Path, inputs: Iterable[str]) -> bool:
+    """Return whether an output takes the place of a file that FILE or FILE:OBJECT names."""
+    from ..files import real_place, split_object_name
 
-    nouns = {kind.identifier: kind.noun for kind in KINDS}
-    lost = [nouns[kind] for kind in kinds if kind not in format_of(path).keeps]
-    if lost:
-        say_error(f"mobius: warning: {path.suffix} files cannot hold {', '.join(lost)}: write a .blend to keep them")
+    return real_place(output) in {real_place(split_object_name(x)[0]) for x in inputs}
 
 
-def warn_of_order(map_path: Path | None, meshes: Iterable[Imported]) -> None:
-    """Say where the map that was written does not count a file's vertices as the file does."""
-    for imported in meshes if map_path else ():
-        if reason := imported.order_change():
-            say_error(f"mobius: warning: the map counts the vertices of '{imported.path}' otherwise: {reason}")
+def orders(map_path: Path | None, meshes: Iterable[Imported | None]) -> list[str]:
+    """Return sentences on where a map to be written does not count a file's vertices as the file does."""
+    found = [(imported.path, imported.order_change()) for imported in meshes if imported is not None and map_path]
+    return [f"the map counts the vertices of '{path}' otherwise: {reason}" for path, reason in found if reason]
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Say sentences as warnings."""
+    for sentence in sentences:
+        say_error(f"mobius: warning: {sentence}")

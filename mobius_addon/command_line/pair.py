@@ -1,8 +1,10 @@
-"""Source and target of a command: imported, read as arrays, and aligned."""
+"""Source and target of a command: opened, read as arrays, and aligned."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ..streams import say, say_error
@@ -15,15 +17,24 @@ if TYPE_CHECKING:
     from ..mesh_data import Surface
 
 
-def import_pair(options: argparse.Namespace) -> tuple[Imported, Imported]:
-    """Return source and target."""
-    from ..files import import_mesh
+@contextmanager
+def opened_pair(options: argparse.Namespace, *, write: bool) -> Iterator[tuple[Imported, Imported, list[str]]]:
+    """Open the target's file, to be written or not, with the source beside it; see `files.opened`.
+
+    Yields
+    ------
+    source, target : Imported
+    notes : list of str
+        Sentences to be said after the context.
+    """
+    from ..files import opened
     from ..mesh_data import Refusal
 
     if _same_mesh(options.source, options.target):
         raise Refusal(f"'{options.source}' is both source and target: give two meshes")
-    target = import_mesh(options.target)  # first, so that its materials and images keep their names
-    return import_mesh(options.source), target
+    with opened(options.target, options.source, write=write) as found:
+        assert found.source is not None
+        yield found.source, found.target, found.notes
 
 
 def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -> tuple[Surface, Surface]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from ..streams import DONE, NOT_ALIGNED, say, say_error
 from .align_options import add_pair_options, align_settings
-from .output_files import require_writable, warn_of_losses, warn_of_order, write_report
-from .pair import align_pair, import_pair, read_pair
+from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
+from .pair import align_pair, opened_pair, read_pair
 from .several_targets import one_by_one
 from .transfer_options import add_transfer_options, transfer_settings
 
@@ -30,13 +30,9 @@ HELP = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what `transfer` takes."""
     add_pair_options(parser, several_targets=True)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        type=Path,
-        required=True,
-        help="mesh file to write; for several targets a folder",
+    add_output_options(
+        parser,
+        "mesh file to write; a .blend holds all that the target's .blend does; for several targets a folder",
     )
     parser.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     add_transfer_options(parser.add_argument_group("transfer"))
@@ -53,7 +49,10 @@ def run(options: argparse.Namespace) -> int:
         _transfer_to(argparse.Namespace(**{**vars(options), "target": targets[0]}))
         return DONE
     status = DONE
-    for one in one_by_one(options):
+    several = one_by_one(options)
+    for one in several:
+        _require_writable(one)
+    for one in several:
         try:
             _transfer_to(one)
         except (Unreadable, MeshError, Refusal) as error:
@@ -67,26 +66,27 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from ...solver import load_map, report, save_map
-    from ..files import Unreadable, export_mesh, new_scene, outputs
+    from ..files import Unreadable, outputs, write_mesh
     from ..operators.transfer import describe_counts, read_through
 
     choices = transfer_settings(options)
     settings = align_settings(options)
     if options.use_map and (options.map or options.report):
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
-    require_writable(meshes=[options.output], others=[options.map, options.report])
-    new_scene()
-    source, target = import_pair(options)
-    surfaces = read_pair(options, source, target)
+    _require_writable(options)
     alignment = None
-    if options.use_map:
-        correspondence = _fitting_map(load_map, options, surfaces)
-    else:
-        alignment, correspondence = align_pair(options, surfaces, settings)
-    plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
-    plan.write(target.obj)
+    with opened_pair(options, write=True) as (source, target, notes):
+        surfaces = read_pair(options, source, target)
+        if options.use_map:
+            correspondence = _fitting_map(load_map, options, surfaces)
+        else:
+            alignment, correspondence = align_pair(options, surfaces, settings)
+        plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
+        plan.write(target.obj)
+        order = orders(options.map, (source, target))
     with outputs() as written:
-        export_mesh(target.obj, written.path(options.output))
+        backup = is_input(options.output, [options.source, options.target])
+        lost = write_mesh(target.obj, options.output, written, backup=backup)
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence)
         if alignment and options.report:
@@ -95,11 +95,14 @@ def _transfer_to(options: argparse.Namespace) -> None:
                 "unmatched": asdict(plan.unmatched),
             }
             write_report(written.path(options.report), figures)
-    for warning in plan.warnings:
-        say_error(f"mobius: warning: {warning}")
-    warn_of_losses(options.output, plan.counts())
-    warn_of_order(options.map, (source, target))
+    warn([*notes, *plan.warnings, *lost, *order])
     say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
+
+
+def _require_writable(options: argparse.Namespace) -> None:
+    inputs = [options.source, options.target, options.use_map, options.landmarks]
+    others = [options.map, options.report]
+    require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 
 
 def _fitting_map(

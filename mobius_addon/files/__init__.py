@@ -1,13 +1,17 @@
 """Meshes in and out of files, through Blender's own importers and exporters."""
 
 from .formats import FORMATS, Format, Unreadable, format_of, split_object_name
+from .opening import Opened, opened
+from .outputs import Outputs, outputs, real_place
 from .reading import Imported, import_mesh, import_meshes, new_scene
-from .writing import Outputs, export_mesh, outputs
+from .temporary import temporary_folder
+from .writing import export_mesh, write_mesh
 
 __all__ = [
     "FORMATS",
     "Format",
     "Imported",
+    "Opened",
     "Outputs",
     "Unreadable",
     "export_mesh",
@@ -15,6 +19,10 @@ __all__ = [
     "import_mesh",
     "import_meshes",
     "new_scene",
+    "opened",
     "outputs",
+    "real_place",
     "split_object_name",
+    "temporary_folder",
+    "write_mesh",
 ]

@@ -1,7 +1,8 @@
-"""The kinds of files: what Blender reads and writes them with, what they can hold, and how an argument names one."""
+"""The kinds of files: what Blender reads and writes them with, and how an argument names one."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import Any
 import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
 
-from ..attributes import KINDS
 from ..mesh_data import Refusal
 from .joining import join_along_seams, join_coinciding
 
@@ -26,16 +26,13 @@ class Format:
     Parameters
     ----------
     importer, exporter : callable
-        Read a path into the scene; write the selected objects to a path.
-    keeps : frozenset of str
-        The kinds of `attributes.KINDS` that such a file can hold.
+        Read a path into the scene; write the selected objects to a path with a small ending.
     join : callable
         Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
 
     importer: Callable[[str], object]
     exporter: Callable[[str], object]
-    keeps: frozenset[str]
     join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
@@ -56,55 +53,55 @@ def _load_blend(path: str) -> None:
 
 
 def _save_blend(path: str) -> None:
-    for obj in set(bpy.data.objects) - set(bpy.context.selected_objects):
-        bpy.data.objects.remove(obj)
-    bpy.data.orphans_purge(do_recursive=True)
-    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False)
+    # a copy, whose relative paths Blender adjusts to the folder; compressed if the file that is open is
+    compress = _is_compressed(bpy.data.filepath)
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, relative_remap=True, compress=compress, check_existing=False)
+
+
+def _is_compressed(path: str) -> bool:
+    if not path:
+        return False
+    with open(path, "rb") as file:
+        return file.read(4) in (b"\x28\xb5\x2f\xfd", b"\x1f\x8b\x08\x00")  # Zstandard, and gzip before Blender 3.0
 
 
 def _save_gltf(path: str) -> None:
     form = "GLB" if path.endswith(".glb") else "GLTF_SEPARATE"
-    _operator("export_scene.gltf", "io_scene_gltf2")(filepath=path, use_selection=True, export_format=form)
+    _operator("export_scene.gltf", "io_scene_gltf2")(
+        filepath=path, use_selection=True, use_active_scene=True, export_format=form
+    )
 
 
-_BLEND = Format(_load_blend, _save_blend, frozenset(kind.identifier for kind in KINDS))
+_BLEND = Format(_load_blend, _save_blend)
 _OBJ = Format(
     lambda path: bpy.ops.wm.obj_import(filepath=path),
     lambda path: bpy.ops.wm.obj_export(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors=True, path_mode="COPY"
     ),
-    frozenset({"colors", "uv", "smoothness"}),
 )
 _PLY = Format(
     lambda path: bpy.ops.wm.ply_import(filepath=path),
     lambda path: bpy.ops.wm.ply_export(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors="SRGB"
     ),
-    frozenset({"colors", "uv", "attributes"}),
     join_along_seams,
 )
 _STL = Format(
     lambda path: bpy.ops.wm.stl_import(filepath=path),
     lambda path: bpy.ops.wm.stl_export(filepath=path, export_selected_objects=True, apply_modifiers=False),
-    frozenset(),
 )
 _GLTF = Format(
-    lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path),
-    _save_gltf,
-    frozenset({"colors", "uv"}),
-    join_coinciding,
+    lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path), _save_gltf, join_coinciding
 )
 _FBX = Format(
     lambda path: _operator("import_scene.fbx", "io_scene_fbx")(filepath=path),
     lambda path: _operator("export_scene.fbx", "io_scene_fbx")(
         filepath=path, use_selection=True, use_mesh_modifiers=False, path_mode="COPY"
     ),
-    frozenset({"colors", "uv"}),
 )
 _USD = Format(
     lambda path: bpy.ops.wm.usd_import(filepath=path),
     lambda path: bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True),
-    frozenset({"colors", "uv", "attributes"}),
 )
 
 FORMATS = {
@@ -118,7 +115,10 @@ FORMATS = {
     ".usd": _USD,
     ".usda": _USD,
     ".usdc": _USD,
+    ".usdz": _USD,
 }
+
+_NAMED = re.compile(rf"(.*(?:{'|'.join(map(re.escape, FORMATS))})):(.+)", re.IGNORECASE | re.DOTALL)
 
 
 def split_object_name(argument: str) -> tuple[Path, str | None]:
@@ -129,10 +129,9 @@ def split_object_name(argument: str) -> tuple[Path, str | None]:
     """
     if Path(argument).exists():
         return Path(argument), None
-    for ending in FORMATS:
-        before, found, name = argument.rpartition(f"{ending}:")
-        if found and name:
-            return Path(before + ending), name
+    named = _NAMED.fullmatch(argument)
+    if named is not None:
+        return Path(named[1]), named[2]
     return Path(argument), None
 
 

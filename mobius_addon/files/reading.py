@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -50,6 +51,14 @@ class Imported:
         return None
 
 
+def require_file(path: Path) -> None:
+    """Raise `Unreadable` if there is nothing to read at `path`."""
+    if not path.is_file():
+        raise Unreadable(f"'{path}' is not a file" if path.exists() else f"there is no file '{path}'")
+    if path.stat().st_size == 0:
+        raise Unreadable(f"'{path}' is empty")
+
+
 def import_meshes(path: Path) -> list[Imported]:
     """Import a file into the scene and return its mesh objects, in alphabetical order.
 
@@ -59,10 +68,7 @@ def import_meshes(path: Path) -> list[Imported]:
         The file is missing, not a mesh file or damaged, or holds no mesh.
     """
     form = format_of(path)
-    if not path.is_file():
-        raise Unreadable(f"'{path}' is not a file" if path.exists() else f"there is no file '{path}'")
-    if path.stat().st_size == 0:
-        raise Unreadable(f"'{path}' is empty")
+    require_file(path)
     # set the scene's names aside, so that imported objects keep theirs
     before = {obj: obj.name for obj in bpy.data.objects}
     for number, obj in enumerate(before):
@@ -95,7 +101,17 @@ def import_mesh(argument: str) -> Imported:
         As `import_meshes`; or the object is not there, or the file has several and none is named.
     """
     path, wanted = split_object_name(argument)
-    meshes = import_meshes(path)
+    return choose(path, wanted, import_meshes(path))
+
+
+def choose(path: Path, wanted: str | None, meshes: Sequence[Imported]) -> Imported:
+    """Return the one of a file's meshes that is named, or the only one.
+
+    Raises
+    ------
+    Unreadable
+        It is not there, or there are several and none is named.
+    """
     listed = ", ".join(f"'{imported.name}'" for imported in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
     if wanted is not None:
         for imported in meshes:

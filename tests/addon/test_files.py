@@ -21,14 +21,16 @@ def test_a_sheet_survives_each_format(ending: str, tmp_path: Path) -> None:
     expected = positions(obj)
     files.export_mesh(obj, tmp_path / f"sheet{ending}")
     files.new_scene()
-    found = files.import_mesh(str(tmp_path / f"sheet{ending}")).obj
+    # a .blend holds the other object too
+    name = ":Sheet" if ending == ".blend" else ""
+    found = files.import_mesh(f"{tmp_path / 'sheet'}{ending}{name}").obj
     surface = read_surface(found)
     assert topology(surface.mesh).is_disc
     # in the world, because importers may turn the object; in any order, because some renumber
     world = np.array([found.matrix_world @ vertex.co for vertex in found.data.vertices])
     assert len(world) == len(expected)
     assert np.abs(world[:, None] - expected).max(axis=2).min(axis=1).max() < 1e-5
-    assert bool(found.data.uv_layers) == ("uv" in files.FORMATS[ending].keeps)
+    assert bool(found.data.uv_layers) == (ending != ".stl")
 
 
 @pytest.mark.parametrize("ending", [".obj", ".ply", ".blend"])
@@ -42,17 +44,16 @@ def test_vertices_keep_the_files_order(ending: str, tmp_path: Path) -> None:
     assert (found.faces == expected.faces).all()
 
 
-def test_a_blend_keeps_vertex_groups_and_only_the_object_asked_for(tmp_path: Path) -> None:
+def test_a_blend_keeps_vertex_groups_and_the_other_objects(tmp_path: Path) -> None:
     obj = make_sheet("Sheet", 5)
     obj.vertex_groups.new(name="Head").add((3,), 0.5, "REPLACE")
     make_sheet("Other", 5)
     files.export_mesh(obj, tmp_path / "sheet.blend")
     files.new_scene()
-    found = files.import_mesh(str(tmp_path / "sheet.blend")).obj
-    assert found.name == "Sheet"
+    found = files.import_mesh(f"{tmp_path / 'sheet.blend'}:Sheet").obj
     assert weights(found, "Head")[3] == 0.5
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "sheet.blend"))
-    assert bpy.context.scene.objects.keys() == ["Sheet"]
+    assert sorted(bpy.context.scene.objects.keys()) == ["Other", "Sheet"]
 
 
 @pytest.fixture
@@ -130,6 +131,7 @@ def test_outputs_appear_together_or_not_at_all(tmp_path: Path) -> None:
 def test_names_with_colons_and_files_that_exist_are_told_apart(tmp_path: Path) -> None:
     assert files.split_object_name("a/scan.blend:Scan: left") == (Path("a/scan.blend"), "Scan: left")
     assert files.split_object_name("scan.obj") == (Path("scan.obj"), None)
+    assert files.split_object_name("SCAN.BLEND:Scan") == (Path("SCAN.BLEND"), "Scan")
     odd = tmp_path / "odd.obj:name.obj"
     odd.write_text("")
     assert files.split_object_name(str(odd)) == (odd, None)

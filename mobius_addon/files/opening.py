@@ -1,0 +1,242 @@
+"""A mesh in the scene that it comes from, and another beside it that is read and leaves nothing behind."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..mesh_data import Refusal
+from ..streams import quiet
+from .formats import Unreadable, first_message, split_object_name
+from .reading import Imported, choose, import_meshes, new_scene, require_file
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A mesh of the file that is open now and, if one was asked for, a second mesh of this file or another.
+
+    Attributes
+    ----------
+    target : Imported
+    source : Imported or None
+        If it came from another file it is gone after the context, with all of its that the target does not use.
+    notes : list of str
+        Sentences about what could not be as it was.
+    """
+
+    target: Imported
+    source: Imported | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def opened(target: str, source: str | None = None, *, write: bool = True) -> Iterator[Opened]:
+    """Open the file of a mesh with all that is in it, for a mesh to be read and written wherever it is, hidden or not.
+
+    In the context both objects are in a scene of their own, in Object Mode; afterwards all is as it was but for what
+    was written. A failure leaves the file open as it stands.
+
+    Parameters
+    ----------
+    target, source : str
+        FILE or FILE:Object; of a .blend the file is opened, of others the meshes are imported into an empty one.
+    write : bool
+        The target is to be written.
+
+    Raises
+    ------
+    Unreadable
+        As `import_meshes` and `choose`; or the target is to be written and linked from another file.
+    """
+    target_path, target_name = split_object_name(target)
+    source_path, source_name = split_object_name(source) if source is not None else (None, None)
+    with ExitStack() as stack:
+        found, lent = None, None
+        if source_path is not None and not _same(source_path, target_path):
+            found = _pick(source_path, source_name, _open_file(source_path))
+            lent = stack.enter_context(_library(found))
+        meshes = _open_file(target_path)
+        goal = _pick(target_path, target_name, meshes)
+        before = {block.session_uid for block in _everything()}
+        notes = _make_writable(goal) if write else []
+        if source_path is not None and found is None:
+            found = _pick(source_path, source_name, meshes)
+            if found.obj != goal.obj and found.obj.data == goal.obj.data:
+                raise Refusal(f"'{source}' and '{target}' share one mesh: make it single-user, or there is one only")
+        elif found is not None and lent is not None:
+            found = replace(found, obj=_append(*lent))
+        objects = [x.obj for x in (goal, found) if x is not None]
+        with _object_mode(objects), _bench(objects):
+            yield Opened(goal, found, notes)
+            if lent is not None and found is not None:
+                notes += _leave_foreign_drivers(goal.obj, before, found.path)
+        if lent is not None:
+            _remove_unused(before)
+
+
+def _same(path: Path, other: Path) -> bool:
+    return path.resolve() == other.resolve()
+
+
+def _open_file(path: Path) -> list[Imported]:
+    """Open a .blend, or import another file into an empty one, and return its meshes in alphabetical order.
+
+    Those that a .blend links come after its own.
+    """
+    if path.suffix.lower() != ".blend":
+        new_scene()
+        return import_meshes(path)
+    require_file(path)
+    try:
+        with quiet():
+            # as the person would open it: relative paths belong to the folder of a link, not of what that points to
+            bpy.ops.wm.open_mainfile(
+                filepath=str(path.absolute()), load_ui=True, use_scripts=False, display_file_selector=False
+            )
+    except RuntimeError as error:
+        raise Unreadable(f"'{path}' could not be read: {first_message(error)}") from error
+    meshes = [Imported(path, obj.name, obj) for obj in bpy.data.objects if obj.type == "MESH"]
+    if not meshes:
+        raise Unreadable(f"'{path}' holds no mesh")
+    return sorted(meshes, key=lambda imported: (imported.obj.library is not None, imported.name))
+
+
+def _pick(path: Path, wanted: str | None, meshes: list[Imported]) -> Imported:
+    """Return the mesh that is named, or the only one that is not linked from elsewhere; see `choose`."""
+    own = [x for x in meshes if x.obj.library is None]
+    return choose(path, wanted, meshes if wanted is not None or not own else own)
+
+
+@contextmanager
+def _library(found: Imported) -> Iterator[tuple[Path, str]]:
+    """Lend a .blend that holds an object of the file that is open, and its name there."""
+    with tempfile.TemporaryDirectory(prefix="mobius-") as folder:
+        if found.obj.library is not None:
+            yield Path(bpy.path.abspath(found.obj.library.filepath)), found.obj.name
+        elif bpy.data.filepath:
+            yield Path(bpy.data.filepath), found.obj.name
+        else:
+            path = Path(folder) / "imported.blend"
+            with quiet():
+                bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, relative_remap=False, check_existing=False)
+            yield path, found.obj.name
+
+
+def _append(path: Path, name: str) -> bpy.types.Object:
+    try:
+        with quiet(), bpy.data.libraries.load(str(path)) as (_, wanted):
+            wanted.objects = [name]
+    except (OSError, RuntimeError) as error:
+        raise Unreadable(f"'{name}' could not be read from '{path}': {first_message(error)}") from error
+    (obj,) = wanted.objects
+    if obj is None:
+        raise Unreadable(f"'{name}' could not be read from '{path}'")
+    return obj
+
+
+def _make_writable(found: Imported) -> list[str]:
+    """Give an object a mesh of its own if another file owns that, and return a sentence about it.
+
+    Raises
+    ------
+    Unreadable
+        Another file owns the object.
+    """
+    obj = found.obj
+    if obj.library is not None:
+        raise Unreadable(
+            f"'{found.name}' is linked from '{obj.library.filepath}' and cannot be changed in '{found.path}': "
+            "name that file, or make the object local"
+        )
+    owner = obj.data.library or obj.data.override_library
+    if owner is None:
+        return []
+    obj.data = obj.data.copy()
+    return [f"the mesh of '{found.name}' belongs to another file: '{found.name}' gets a copy of its own"]
+
+
+@contextmanager
+def _object_mode(objects: list[bpy.types.Object]) -> Iterator[None]:
+    """Leave Edit Mode or a paint mode that the file was saved in, and enter it again."""
+    active = bpy.context.view_layer.objects.active
+    modes = {obj.mode for obj in objects} - {"OBJECT"}
+    if not modes:
+        yield
+        return
+    mode = modes.pop()
+    if active is not None and active.mode == mode:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    if busy := [obj.name for obj in objects if obj.mode != "OBJECT"]:
+        raise Refusal(f"'{busy[0]}' was saved in {mode.title().replace('_', ' ')} Mode: leave it and save again")
+    yield
+    bpy.ops.object.mode_set(mode=mode)
+
+
+@contextmanager
+def _bench(objects: list[bpy.types.Object]) -> Iterator[None]:
+    """Have a scene with nothing but these objects, shown, for the context; what the person has open stays as it is."""
+    of = next(iter(objects[0].users_scene), bpy.context.scene)
+    scene = bpy.data.scenes.new("Mobius")
+    scene.frame_current, scene.frame_subframe = of.frame_current, of.frame_subframe
+    hidden = [obj for obj in objects if obj.hide_viewport]
+    for obj in objects:
+        scene.collection.objects.link(obj)
+        obj.hide_viewport = False
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection):
+        bpy.context.view_layer.update()
+        yield
+    for obj in hidden:
+        obj.hide_viewport = True
+    bpy.data.scenes.remove(scene)
+
+
+def _everything() -> Iterator[Any]:
+    """Yield all data-blocks of the file that is open."""
+    for prop in bpy.data.bl_rna.properties:
+        if prop.type == "COLLECTION":
+            yield from getattr(bpy.data, prop.identifier)
+
+
+def _leave_foreign_drivers(obj: bpy.types.Object, before: set[int], source: Path) -> list[str]:
+    """Remove drivers of shape keys that point into the source's file, and return a sentence for each.
+
+    One that points at a scene points at the target's.
+    """
+    keys = obj.data.shape_keys
+    if keys is None or keys.animation_data is None:
+        return []
+    known = before | {obj.data.session_uid, keys.session_uid}
+    scene = next((x for x in obj.users_scene if x.session_uid in known), None)
+    notes = []
+    for curve in list(keys.animation_data.drivers):
+        ends = [end for variable in curve.driver.variables for end in variable.targets]
+        foreign = [end for end in ends if end.id is not None and end.id.session_uid not in known]
+        for end in foreign:
+            if isinstance(end.id, bpy.types.Scene) and scene is not None:
+                end.id = scene
+        names = [end.id.name for end in foreign if end.id.session_uid not in known]
+        if names:
+            notes.append(
+                f"the driver of {curve.data_path} points at '{names[0]}' in '{source}', which does not come along: "
+                "the value stays as it is"
+            )
+            keys.animation_data.drivers.remove(curve)
+    return notes
+
+
+def _remove_unused(before: set[int]) -> None:
+    """Remove what has come since but for what the file's own data uses now."""
+    new = [block for block in _everything() if block.session_uid not in before]
+    users = bpy.data.user_map(subset=set(new))
+    known = set(before)
+    while more := [x for x in new if x.session_uid not in known and any(y.session_uid in known for y in users[x])]:
+        known |= {block.session_uid for block in more}
+        libraries = [block.library for block in more if block.library is not None]
+        known |= {library.session_uid for library in libraries}
+    bpy.data.batch_remove([block for block in new if block.session_uid not in known])
