@@ -2,7 +2,7 @@
 
 from .formats import FORMATS, Format, Unreadable, format_of, split_object_name
 from .opening import Opened, opened
-from .outputs import Outputs, outputs, real_place
+from .publishing import Outputs, outputs, real_place
 from .reading import Imported, import_mesh, import_meshes, new_scene
 from .temporary import temporary_folder
 from .writing import export_mesh, write_mesh

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,6 +74,16 @@ def _save_gltf(path: str) -> None:
     )
 
 
+def _import_usd(path: str) -> None:
+    small = str(Path(path).with_suffix(Path(path).suffix.lower()))
+    if path == small or not path.lower().endswith(".usdz"):
+        bpy.ops.wm.usd_import(filepath=path)
+        return
+    # such a package is known by a small ending only
+    with tempfile.TemporaryDirectory(prefix="mobius-") as folder:
+        bpy.ops.wm.usd_import(filepath=shutil.copyfile(path, str(Path(folder) / Path(small).name)))
+
+
 _BLEND = Format(_load_blend, _save_blend)
 _OBJ = Format(
     lambda path: bpy.ops.wm.obj_import(filepath=path),
@@ -100,7 +112,7 @@ _FBX = Format(
     ),
 )
 _USD = Format(
-    lambda path: bpy.ops.wm.usd_import(filepath=path),
+    _import_usd,
     lambda path: bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True),
 )
 
@@ -151,6 +163,9 @@ def format_of(path: Path) -> Format:
 
 
 def first_message(error: Exception) -> str:
-    """Return the first message of an importer's error."""
-    first = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
-    return first.removeprefix("Error:").strip()
+    """Return the first message of an importer's or exporter's error; of one in Python, what it ends with."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    if any(line.endswith("Traceback (most recent call last):") for line in lines):
+        errors = [line for line in lines if re.match(r"[\w.]*(Error|Exception|Interrupt)\b", line)]
+        return errors[-1] if errors else lines[-1]
+    return lines[0].removeprefix("Error:").strip() if lines else type(error).__name__

@@ -163,19 +163,21 @@ def _make_writable(found: Imported) -> list[str]:
 
 @contextmanager
 def _object_mode(objects: list[bpy.types.Object]) -> Iterator[None]:
-    """Leave Edit Mode or a paint mode that the file was saved in, and enter it again."""
-    active = bpy.context.view_layer.objects.active
-    modes = {obj.mode for obj in objects} - {"OBJECT"}
-    if not modes:
+    """Leave Edit Mode, in which the file may have been saved, and enter it again; other modes change no mesh."""
+    edited = [obj for obj in objects if obj.mode == "EDIT"]
+    if not edited:
         yield
         return
-    mode = modes.pop()
-    if active is not None and active.mode == mode:
+    view = bpy.context.view_layer
+    active = view.objects.active
+    if edited[0].name in view.objects:
+        view.objects.active = edited[0]
         bpy.ops.object.mode_set(mode="OBJECT")
-    if busy := [obj.name for obj in objects if obj.mode != "OBJECT"]:
-        raise Refusal(f"'{busy[0]}' was saved in {mode.title().replace('_', ' ')} Mode: leave it and save again")
+    if busy := [obj.name for obj in objects if obj.mode == "EDIT"]:
+        raise Refusal(f"'{busy[0]}' was saved in Edit Mode: leave it and save again")
     yield
-    bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.object.mode_set(mode="EDIT")
+    view.objects.active = active
 
 
 @contextmanager

@@ -13,9 +13,9 @@ from ..mesh_data import Refusal
 from ..streams import quiet
 from .contents import Contents, contents_of, losses
 from .formats import first_message, format_of
-from .outputs import Outputs, real_place
 from .parts import free_name
 from .pictures import separate_gltf_pictures, separate_pictures
+from .publishing import Outputs, real_place
 from .reading import new_scene
 
 

@@ -1,90 +1,90 @@
 """Everything that is in a .blend file, field by field, as Blender's own description of its data lists it."""
 
+import os
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+Block = tuple[str, str, str]
 Fields = dict[str, Any]
 
-# what is no content: how often something is used, what is computed, what a window shows at the moment
+# what is no content: how often something is used, and what is computed
 _PASSING = {
-    "rna_type", "users", "session_uid", "is_evaluated", "original", "id_data", "tag", "preview", "asset_data",
-    "is_dirty", "frame_duration", "has_data", "is_valid", "is_runtime_data", "active_operator", "depsgraph",
-    "view_layers_depsgraph", "bindcode", "select_keyed", "is_missing", "library_weak_reference",
-    "show_region_hud", "statusbar", "render_slots", "channels_scope", "scopes", "eval_time", "execution_time",
-    "users_scene", "users_collection", "children_recursive", "rigidbody_world", "is_editmode",
+    "rna_type", "users", "session_uid", "is_evaluated", "original", "id_data", "tag", "preview", "is_dirty",
+    "frame_duration", "has_data", "depsgraph", "bindcode", "library_weak_reference", "eval_time", "execution_time",
+    "users_scene", "users_collection", "children_recursive", "pixels", "uv_layer_clone", "uv_layer_stencil",
+    "vertex_selection", "edge_selection", "pin", "pin_uv", "select_edge",
 }  # fmt: skip
 _PATHS = {"FILE_PATH", "DIR_PATH", "FILEPATH", "DIRPATH"}
 _LEFT_OUT = {"window_managers", "screens", "workspaces"}
 
 
-def whole_file(path: Path) -> dict[tuple[str, str, str], Fields]:
+def whole_file(path: Path) -> dict[Block, Fields]:
     """Open a .blend and return the fields of each data-block, by its type, name and library."""
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     bpy.context.view_layer.update()
-    found: dict[tuple[str, str, str], Fields] = {}
+    found: dict[Block, Fields] = {}
     for prop in bpy.data.bl_rna.properties:
         if prop.type == "COLLECTION" and prop.identifier not in _LEFT_OUT:
             for block in getattr(bpy.data, prop.identifier):
-                found[_reference(block)] = _fields(block, block, {block.as_pointer()})
+                found[_reference(block)] = _fields(block, block, {_key(block)})
     return found
 
 
-def differences(before: Any, after: Any, where: str = "") -> list[str]:
-    """Return where two such values differ, one line each."""
+def differences(before: Any, after: Any, more: bool = False, where: str = "") -> Iterator[str]:
+    """Yield where two such values differ, a line each; with `more` the second may have more than the first."""
+    if more and before in (None, [], {}, "nothing"):
+        return
+    if more and isinstance(before, list) and isinstance(after, list):
+        after = after[: len(before)]
     if isinstance(before, dict) and isinstance(after, dict):
-        keys = [*before, *(key for key in after if key not in before)]
-        return [x for key in keys for x in differences(before.get(key), after.get(key), f"{where}/{key}")]
-    if isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        pairs = enumerate(zip(before, after, strict=True))
-        return [x for number, (old, new) in pairs for x in differences(old, new, f"{where}[{number}]")]
-    return [] if before == after else [f"{where}: {before!r:.200} -> {after!r:.200}"]
+        for key in [*before, *(key for key in after if key not in before and not more)]:
+            yield from differences(before.get(key, "nothing"), after.get(key, "nothing"), more, f"{where}/{key}")
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for number, (old, new) in enumerate(zip(before, after, strict=True)):
+            yield from differences(old, new, more, f"{where}[{number}]")
+    elif before != after:
+        yield f"{where}: {before!r:.200} -> {after!r:.200}"
 
 
-def _reference(block: Any) -> tuple[str, str, str]:
+def _reference(block: Any) -> Block:
     import bpy
 
     library = block.library
-    return (
-        block.rna_type.identifier,
-        block.name,
-        str(_absolute(bpy.path.abspath(library.filepath))) if library else "",
-    )
+    return block.rna_type.identifier, block.name, _normal(bpy.path.abspath(library.filepath)) if library else ""
 
 
-def _absolute(path: str) -> str:
-    import os
-
+def _normal(path: str) -> str:
     return os.path.normpath(path) if path else ""
+
+
+def _key(struct: Any) -> int:
+    """What tells a struct from the one that it is in, which may begin at the same address."""
+    return hash((struct.as_pointer(), struct.bl_rna.identifier))
 
 
 def _fields(struct: Any, owner: Any, seen: set[int]) -> Fields:
     result: Fields = {}
-    for prop in struct.bl_rna.properties:
-        if prop.identifier in _PASSING or (prop.is_skip_save and prop.type in ("POINTER", "COLLECTION")):
+    # what is in a collection is told there, and where something points at it only that it does
+    for prop in sorted(struct.bl_rna.properties, key=lambda prop: prop.type != "COLLECTION"):
+        if prop.identifier in _PASSING:
             continue
-        try:
-            value = getattr(struct, prop.identifier)
-        except (AttributeError, RuntimeError, ValueError, SystemError, TypeError):
-            continue
-        result[prop.identifier] = _value(prop, value, owner, seen)
-    if hasattr(struct, "keys"):
-        try:
-            result["custom"] = {
-                key: _custom(struct[key]) for key in struct.keys() if key not in struct.bl_rna.properties
-            }
-        except (TypeError, KeyError):
-            pass
+        with suppress(AttributeError, RuntimeError, ValueError, SystemError, TypeError):
+            result[prop.identifier] = _value(prop, getattr(struct, prop.identifier), owner, seen)
+    with suppress(AttributeError, TypeError, KeyError):
+        known = struct.bl_rna.properties
+        result["custom properties"] = {key: _custom(value) for key, value in struct.items() if key not in known}
     return result
 
 
 def _custom(value: Any) -> Any:
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    if hasattr(value, "to_list"):
-        return value.to_list()
-    return value if isinstance(value, (str, int, float, bool, bytes)) else repr(value)
+    for turn in ("to_dict", "to_list"):
+        if hasattr(value, turn):
+            return getattr(value, turn)()
+    return value if isinstance(value, str | int | float | bool | bytes) else type(value).__name__
 
 
 def _value(prop: Any, value: Any, owner: Any, seen: set[int]) -> Any:
@@ -93,24 +93,28 @@ def _value(prop: Any, value: Any, owner: Any, seen: set[int]) -> Any:
     if prop.type == "POINTER":
         return _pointed(value, owner, seen)
     if prop.type == "COLLECTION":
-        return [_pointed(item, owner, seen) for item in value]
+        items = [_pointed(item, owner, seen) for item in value]
+        names = [item.get("name") if isinstance(item, dict) else None for item in items]
+        if items and all(names) and len(set(names)) == len(names):
+            return dict(zip(names, items, strict=True))
+        return items
     if prop.type == "STRING":
-        if prop.subtype in _PATHS and value and isinstance(value, str):
-            return _absolute(bpy.path.abspath(value, library=getattr(owner, "library", None)))
-        return value
-    if getattr(prop, "is_array", False):
-        return [_plain(x) for x in _flat(value)]
-    return _plain(value)
+        is_path = prop.subtype in _PATHS and isinstance(value, str)
+        return _normal(bpy.path.abspath(value, library=getattr(owner, "library", None))) if is_path else value
+    return _plain(list(_flat(value)) if getattr(prop, "is_array", False) else value)
 
 
-def _flat(value: Any) -> list[Any]:
-    return [y for x in value for y in (_flat(x) if hasattr(x, "__len__") else [x])]
+def _flat(value: Any) -> Iterator[Any]:
+    for item in value:
+        yield from _flat(item) if hasattr(item, "__len__") else [item]
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain(x) for x in value]
     if isinstance(value, float):
         return float(f"{value:.5g}") if abs(value) > 1e-6 else 0.0
-    return sorted(value) if isinstance(value, (set, frozenset)) else value
+    return sorted(value) if isinstance(value, set | frozenset) else value
 
 
 def _pointed(value: Any, owner: Any, seen: set[int]) -> Any:
@@ -121,9 +125,7 @@ def _pointed(value: Any, owner: Any, seen: set[int]) -> Any:
     embedded = isinstance(value, bpy.types.ID) and value.is_embedded_data
     if isinstance(value, bpy.types.ID) and not embedded:
         return _reference(value)
-    # a struct may begin at the address of the one that holds it
-    key = hash((value.as_pointer(), value.bl_rna.identifier))
-    if key in seen or not hasattr(value, "bl_rna"):
+    if _key(value) in seen:
         return "above"
-    seen.add(key)
+    seen.add(_key(value))
     return _fields(value, value if embedded else owner, seen)
