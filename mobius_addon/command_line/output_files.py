@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,22 +47,15 @@ def require_writable(
     Unreadable
         One cannot be written.
     """
-    from ..files import Unreadable, format_of, real_place, split_object_name, temporary_folder
+    from ..files import Unreadable, format_of, real_place, require_folder, require_place, split_object_name
 
     meshes, others = list(meshes), [path for path in others if path is not None]
     read = {real_place(split_object_name(x)[0] if isinstance(x, str) else x) for x in inputs if x is not None}
     for path in meshes:
         format_of(path)
     for path in [*meshes, *others]:
+        require_place(path)
         place = real_place(path)
-        if place.is_dir():
-            raise Unreadable(f"'{path}' is a folder: name a file to write")
-        if place.is_symlink() or (place.exists() and not place.is_file()):
-            raise Unreadable(f"'{path}' is no file that can be replaced: name another one")
-        if not place.parent.is_dir():
-            raise Unreadable(f"there is no folder '{path.parent}' to write '{path.name}' in")
-        if place.exists() and not os.access(place, os.W_OK):
-            raise Unreadable(f"'{path}' is write-protected: name another file, or allow writing")
         if place in read and path in others:
             raise Unreadable(f"'{path}' is read by this command: name another file to write")
         if place in read and not overwrite:
@@ -71,11 +63,7 @@ def require_writable(
     if len({real_place(path) for path in [*meshes, *others]}) < len(meshes) + len(others):
         raise Unreadable("two outputs have the same name")
     for folder in {real_place(path).parent for path in [*meshes, *others]}:
-        try:
-            with temporary_folder(folder):
-                pass
-        except OSError as error:
-            raise Unreadable(f"nothing can be written in the folder '{folder}' ({error.strerror})") from error
+        require_folder(folder)
 
 
 def write_report(path: Path, figures: dict[str, Any]) -> None:

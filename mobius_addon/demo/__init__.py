@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -19,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from ... import solver
 from .. import stored_alignment
 from ..attributes import Carrier, plan_transfer
-from ..files import Unreadable, new_scene, outputs
+from ..files import Unreadable, new_scene, outputs, require_folder, require_place
 from ..mesh_data import Refusal, Surface, read_surface
 from ..operators.align import summary, write_alignment
 from ..operators.transfer import describe_counts
@@ -28,6 +27,8 @@ from .accuracy import best_rigid_error, transfer_error
 from .paint import FACE_PAINT, GRID_UV, paint_source
 from .pictures import Disc, Sitter, clay_material, hues, paint_material, render_discs, render_heads, require_cycles
 from .scans import POSE, GroundTruth, build_scans
+
+FILES = ("correspondence.png", "discs.png", "demo.blend", "REPORT.json")
 
 # The second scan is known not to be mirrored, and a face is too nearly its own mirror image to ask.
 SETTINGS = replace(solver.AlignSettings(), reflect="never")
@@ -98,7 +99,7 @@ def run(output_dir: Path) -> int:
         save_blend(written.path(output_dir / "demo.blend"))
         written.path(output_dir / "REPORT.json").write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     say("seconds: " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in seconds.items()))
-    for name in ("correspondence.png", "discs.png", "demo.blend", "REPORT.json"):
+    for name in FILES:
         say(str(output_dir / name))
     return DONE
 
@@ -116,10 +117,11 @@ def writable_folder(path: Path) -> Iterator[None]:
     try:
         try:
             path.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=path, prefix=".mobius-"):
-                pass
         except OSError as error:
             raise Unreadable(f"nothing can be written in the folder '{path}' ({error.strerror})") from error
+        require_folder(path)
+        for name in FILES:
+            require_place(path / name)
         yield
     except BaseException:
         for folder in missing:

@@ -2,9 +2,8 @@
 
 from .formats import FORMATS, Format, Unreadable, format_of, split_object_name
 from .opening import Opened, opened
-from .publishing import Outputs, outputs, real_place
+from .publishing import Outputs, outputs, real_place, require_folder, require_place
 from .reading import Imported, import_mesh, import_meshes, new_scene
-from .temporary import temporary_folder
 from .writing import export_mesh, write_mesh
 
 __all__ = [
@@ -22,7 +21,8 @@ __all__ = [
     "opened",
     "outputs",
     "real_place",
+    "require_folder",
+    "require_place",
     "split_object_name",
-    "temporary_folder",
     "write_mesh",
 ]

@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 
 from ..mesh_data import Refusal
+from .formats import Unreadable
 from .parts import own_parts
 from .temporary import temporary_folder
 
@@ -20,6 +21,28 @@ from .temporary import temporary_folder
 def real_place(path: Path) -> Path:
     """Return where a path leads, whatever links are on the way; the last file need not be there."""
     return Path(os.path.realpath(path))
+
+
+def require_place(path: Path) -> None:
+    """Raise `Unreadable` if no file can be written, or replaced, at `path`; see also `require_folder`."""
+    place = real_place(path)
+    if place.is_dir():
+        raise Unreadable(f"'{path}' is a folder: name a file to write")
+    if place.is_symlink() or (place.exists() and not place.is_file()):
+        raise Unreadable(f"'{path}' is no file that can be replaced: name another one")
+    if not place.parent.is_dir():
+        raise Unreadable(f"there is no folder '{path.parent}' to write '{path.name}' in")
+    if place.exists() and not os.access(place, os.W_OK):
+        raise Unreadable(f"'{path}' is write-protected: name another file, or allow writing")
+
+
+def require_folder(folder: Path) -> None:
+    """Raise `Unreadable` if nothing can be written in `folder`."""
+    try:
+        with temporary_folder(folder):
+            pass
+    except OSError as error:
+        raise Unreadable(f"nothing can be written in the folder '{folder}' ({error.strerror})") from error
 
 
 @dataclass(frozen=True)

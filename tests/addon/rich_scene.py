@@ -1,5 +1,7 @@
 """A .blend file as people have them, with a sheet in it that is to receive something."""
 
+import shutil
+import wave
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -229,11 +231,21 @@ def _other(kind: str, target: Any, folder: Path) -> None:
     elif kind == "LIGHT":
         link(bpy.data.objects.new("Light", bpy.data.lights.new("Light", "SPOT")))
     elif kind == "TEXT":
-        link(bpy.data.objects.new("Text", bpy.data.curves.new("Text", "FONT")))
+        text = bpy.data.curves.new("Text", "FONT")
+        own = next((Path(bpy.utils.system_resource("DATAFILES")) / "fonts").glob("*.woff2"))
+        text.font = bpy.data.fonts.load(shutil.copyfile(own, str(folder / own.name)))
+        text.font.filepath = bpy.path.relpath(text.font.filepath)
+        link(bpy.data.objects.new("Text", text))
     elif kind == "CURVE":
         bpy.ops.curve.primitive_bezier_curve_add()
     elif kind == "SPEAKER":
-        link(bpy.data.objects.new("Speaker", bpy.data.speakers.new("Speaker")))
+        with wave.open(str(folder / "sound.wav"), "wb") as sound:
+            sound.setparams((1, 1, 8000, 8, "NONE", ""))
+            sound.writeframes(bytes(8))
+        speaker = bpy.data.speakers.new("Speaker")
+        speaker.sound = bpy.data.sounds.load(str(folder / "sound.wav"))
+        speaker.sound.filepath = bpy.path.relpath(speaker.sound.filepath)
+        link(bpy.data.objects.new("Speaker", speaker))
     elif kind == "SHARED":
         link(bpy.data.objects.new("Twin", target.data))
     elif kind in ("LINKED", "OVERRIDE"):
