@@ -164,20 +164,27 @@ def _make_writable(found: Imported) -> list[str]:
 @contextmanager
 def _object_mode(objects: list[bpy.types.Object]) -> Iterator[None]:
     """Leave Edit Mode, in which the file may have been saved, and enter it again; other modes change no mesh."""
-    edited = [obj for obj in objects if obj.mode == "EDIT"]
-    if not edited:
+    if not any(obj.mode == "EDIT" for obj in objects):
         yield
         return
     view = bpy.context.view_layer
-    active = view.objects.active
-    if edited[0].name in view.objects:
+    edited = [obj for obj in view.objects if obj.mode == "EDIT"]
+    active, selected = view.objects.active, [obj for obj in view.objects if obj.select_get()]
+    if edited:
         view.objects.active = edited[0]
         bpy.ops.object.mode_set(mode="OBJECT")
     if busy := [obj.name for obj in objects if obj.mode == "EDIT"]:
         raise Refusal(f"'{busy[0]}' was saved in Edit Mode: leave it and save again")
+    view.objects.active = active
     yield
+    # all that are selected enter it together
+    for obj in view.objects:
+        obj.select_set(obj in edited)
+    view.objects.active = edited[0]
     bpy.ops.object.mode_set(mode="EDIT")
     view.objects.active = active
+    for obj in view.objects:
+        obj.select_set(obj in selected)
 
 
 @contextmanager
