@@ -45,6 +45,7 @@ def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: 
     backup = backup and final.suffix.lower() == ".blend"
     path = written.path(final, free_name(real_place(final)), backup=backup)
     if path.suffix == ".blend":
+        _require_no_library(final)
         export_mesh(obj, path)
         _require_whole(path, obj.name)
         return _newer(final)
@@ -147,6 +148,13 @@ def _read_again(path: Path, before: Contents) -> Contents:
         gone = before.triangles - after.triangles
         raise Refusal(f"'{path.name}' was not written whole: {gone:,} of {before.triangles:,} triangles are missing")
     return after
+
+
+def _require_no_library(final: Path) -> None:
+    """Raise `Refusal` if a .blend would take the place of one that it links."""
+    for library in bpy.data.libraries:
+        if real_place(Path(bpy.path.abspath(library.filepath))) == real_place(final):
+            raise Refusal(f"'{final}' is linked by the file that would be written there: name another one")
 
 
 def _require_whole(path: Path, name: str) -> None:

@@ -146,6 +146,9 @@ def test_a_linked_mesh_is_copied_and_a_linked_object_refused(
     status, _, err = run(capsys, "flatten", f"{path}:Linked", "-o", tmp_path / "no.blend")
     assert status == 2
     assert "'Linked' is linked from" in err
+    library = tmp_path / "other" / "library.blend"
+    status, _, err = run(capsys, "flatten", f"{path}:Target", "-o", library)
+    assert (status, "is linked by the file that would be written there" in err) == (1, True)
     # it is read all the same
     status, _, err = run(capsys, "transfer", f"{path}:Linked", f"{path}:Target", "-o", out, *CARRY)
     assert (status, err) == (0, "")
