@@ -46,6 +46,7 @@ SCENES = st.builds(
 CHANGES = ("/active", "is_active", "/material_index", "/groups", "/index", "/color_index", "attributes/.")
 
 
+@pytest.mark.timeout(300 + 20 * COUNT)
 @settings(
     max_examples=COUNT, deadline=None, derandomize="MOBIUS_ROUND_TRIPS" not in os.environ, print_blob=False,
     suppress_health_check=list(HealthCheck), phases=[Phase.generate, Phase.shrink],
