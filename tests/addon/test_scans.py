@@ -200,7 +200,7 @@ def test_duplicate_and_turned_faces_are_put_in_order_for_the_computation(capfd: 
 def test_a_face_that_uses_a_vertex_twice_is_left_out() -> None:
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     mesh = TriangleMesh(corners, np.array([(0, 1, 2), (0, 1, 1), (0, 2, 3)]), "Scan")
-    tidy = in_order(mesh, Repair())
+    tidy = in_order(mesh)
     assert tidy.mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert tidy.changes == ("1 face with a vertex used twice left out",)
 
