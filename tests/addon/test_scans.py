@@ -258,9 +258,9 @@ def test_a_surface_with_one_side_is_refused() -> None:
 
 def test_a_clean_mesh_is_not_copied() -> None:
     mesh = read_surface(make_sheet("Sheet", 5)).mesh
-    assert in_order(mesh, Repair(True, True)).mesh is mesh
+    assert in_order(mesh, largest_part=True).mesh is mesh
     with pytest.raises(MeshError, match="has only faces that use a vertex twice"):
-        in_order(TriangleMesh(mesh.vertices, np.array([(0, 0, 1)]), "Bad"), Repair())
+        in_order(TriangleMesh(mesh.vertices, np.array([(0, 0, 1)]), "Bad"))
 
 
 def test_a_concave_polygon_is_cut_as_blender_draws_it() -> None:
