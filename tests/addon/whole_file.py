@@ -15,7 +15,7 @@ _PASSING = {
     "frame_duration", "has_data", "depsgraph", "bindcode", "library_weak_reference", "eval_time", "execution_time",
     "users_scene", "users_collection", "children_recursive", "pixels", "uv_layer_clone", "uv_layer_stencil",
     "vertex_selection", "edge_selection", "pin", "pin_uv", "select_edge", "is_library_indirect",
-    "tool_slots",  # which ends Blender 4.2
+    "uv_sculpt",  # which ends Blender 4.2
 }  # fmt: skip
 _PATHS = {"FILE_PATH", "DIR_PATH", "FILEPATH", "DIRPATH"}
 _LEFT_OUT = {"window_managers", "screens", "workspaces"}
