@@ -163,25 +163,31 @@ def _make_writable(found: Imported) -> list[str]:
 
 @contextmanager
 def _object_mode(objects: list[bpy.types.Object]) -> Iterator[None]:
-    """Leave Edit Mode, in which the file may have been saved, and enter it again; other modes change no mesh."""
-    if not any(obj.mode == "EDIT" for obj in objects):
+    """Leave the modes that the file was saved in, and enter them again.
+
+    Edit Mode hides layers, and weights are shown by the tool settings of a scene, of which `_bench` has none.
+    """
+    view = bpy.context.view_layer
+    if all(obj.mode == "OBJECT" for obj in objects):
         yield
         return
-    view = bpy.context.view_layer
+    busy = [(obj, obj.mode) for obj in view.objects if obj in objects and obj.mode != "OBJECT"]
     edited = [obj for obj in view.objects if obj.mode == "EDIT"]
     active, selected = view.objects.active, [obj for obj in view.objects if obj.select_get()]
-    if edited:
-        view.objects.active = edited[0]
-        bpy.ops.object.mode_set(mode="OBJECT")
-    if busy := [obj.name for obj in objects if obj.mode == "EDIT"]:
-        raise Refusal(f"'{busy[0]}' was saved in Edit Mode: leave it and save again")
+    for obj, mode in busy:
+        view.objects.active = obj
+        if obj.mode == mode:  # all leave Edit Mode together
+            bpy.ops.object.mode_set(mode="OBJECT")
+    if left := [obj.name for obj in objects if obj.mode != "OBJECT"]:
+        raise Refusal(f"'{left[0]}' was saved in another mode than Object Mode: leave it and save again")
     view.objects.active = active
     yield
-    # all that are selected enter it together
-    for obj in view.objects:
-        obj.select_set(obj in edited)
-    view.objects.active = edited[0]
-    bpy.ops.object.mode_set(mode="EDIT")
+    for obj, mode in busy:
+        if obj.mode == "OBJECT":
+            for other in view.objects:  # all that are selected enter Edit Mode together
+                other.select_set(other in edited if mode == "EDIT" else other == obj)
+            view.objects.active = obj
+            bpy.ops.object.mode_set(mode=mode)
     view.objects.active = active
     for obj in view.objects:
         obj.select_set(obj in selected)
@@ -205,11 +211,11 @@ def _bench(objects: list[bpy.types.Object]) -> Iterator[None]:
     bpy.data.scenes.remove(scene)
 
 
-def _everything() -> Iterator[Any]:
-    """Yield all data-blocks of the file that is open."""
-    for prop in bpy.data.bl_rna.properties:
-        if prop.type == "COLLECTION":
-            yield from getattr(bpy.data, prop.identifier)
+def _everything() -> list[Any]:
+    """Return all data-blocks of the file that is open."""
+    lists = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
+    # each once: later Blenders have a list of all beside those of each type
+    return list(dict.fromkeys(block for name in lists for block in getattr(bpy.data, name)))
 
 
 def _leave_foreign_drivers(obj: bpy.types.Object, before: set[int], source: Path) -> list[str]:

@@ -35,7 +35,7 @@ SCENES = st.builds(
         st.sampled_from(["CAMERA", "LIGHT", "TEXT", "CURVE", "SPEAKER", "SHARED", "LINKED", "OVERRIDE"]),
         max_size=4, unique=True,
     ).map(tuple),
-    mode=st.sampled_from(["OBJECT", "OBJECT", "EDIT", "WEIGHT_PAINT"]),
+    mode=st.sampled_from(["OBJECT", "OBJECT", "EDIT", "WEIGHT_PAINT", "SCULPT", "VERTEX_PAINT"]),
     unit_scale=st.sampled_from([1.0, 0.01]),
     frame=st.integers(1, 30),
     constraint=st.booleans(),

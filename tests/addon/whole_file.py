@@ -18,7 +18,7 @@ _PASSING = {
     "uv_sculpt",  # which ends Blender 4.2
 }  # fmt: skip
 _PATHS = {"FILE_PATH", "DIR_PATH", "FILEPATH", "DIRPATH"}
-_LEFT_OUT = {"window_managers", "screens", "workspaces"}
+_LEFT_OUT = {"WindowManager", "Screen", "WorkSpace"}
 
 
 def whole_file(path: Path) -> dict[Block, Fields]:
@@ -29,8 +29,8 @@ def whole_file(path: Path) -> dict[Block, Fields]:
     bpy.context.view_layer.update()
     found: dict[Block, Fields] = {}
     for prop in bpy.data.bl_rna.properties:
-        if prop.type == "COLLECTION" and prop.identifier not in _LEFT_OUT:
-            for block in getattr(bpy.data, prop.identifier):
+        for block in getattr(bpy.data, prop.identifier) if prop.type == "COLLECTION" else ():
+            if block.rna_type.identifier not in _LEFT_OUT:
                 found[_reference(block)] = _fields(block, block, {_key(block)})
     return found
 

@@ -54,11 +54,14 @@ def test_a_mesh_that_cannot_be_seen_or_selected_is_written(
     assert run(capsys, "check", f"{out}:Target" if ending == ".blend" else out)[0] == 0
 
 
-def test_a_file_saved_in_edit_mode_is_still_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = build(Scene(mode="EDIT", others=("CAMERA",)), tmp_path / "scene")
+@pytest.mark.parametrize("mode", ["EDIT", "WEIGHT_PAINT", "VERTEX_PAINT", "SCULPT"])
+def test_a_file_saved_in_another_mode_is_still_in_it(
+    mode: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = build(Scene(mode=mode, groups=1, modifiers=("SOLIDIFY",), others=("CAMERA",)), tmp_path / "scene")
     assert run(capsys, "flatten", f"{path}:Target", "-o", tmp_path / "out.blend")[0] == 0
     target = opened(tmp_path / "out.blend")
-    assert target.mode == "EDIT"
+    assert target.mode == mode
     bpy.ops.object.mode_set(mode="OBJECT")
     assert "Mobius Disc" in target.data.uv_layers
     views = [area.spaces.active.region_3d for area in bpy.context.screen.areas if area.type == "VIEW_3D"]
