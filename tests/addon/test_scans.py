@@ -398,7 +398,7 @@ def test_flatten_command(scans: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert obj.data.color_attributes.keys() == ["Mobius Disc Angles"]
     status, _, err = run(capsys, "flatten", "sheet.obj", "-o", "flat.stl", "--distortion", "factor")
     assert status == 0
-    assert ".stl files cannot hold UV maps, color attributes: write a .blend to keep them" in err
+    assert "'flat.stl' is without UV map 'Mobius Disc'; color attribute 'Mobius Disc Sizes'" in err
 
 
 def test_flatten_command_takes_the_named_boundary(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
