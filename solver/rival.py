@@ -32,12 +32,15 @@ class Rival:
         No transformation that sends every point elsewhere has a larger Q.
     matches : (k, 2) int
         As `SearchResult.matches`.
+    out_of_time : bool
+        Whether the time limit ended the search: only then do its figures depend on the machine.
     """
 
     mobius: Mobius
     value: float
     upper_bound: float
     matches: Integers
+    out_of_time: bool = False
 
 
 def best_rival(
@@ -66,14 +69,6 @@ def best_rival(
     elsewhere = np.ones(objective.weights.shape, bool)
     for mobius in known:
         elsewhere &= hyperbolic_distance(mobius(objective.source)[:, None], objective.target) > ELSEWHERE
-    stopped = False
-
-    def decided(state: SearchProgress) -> bool | None:
-        nonlocal stopped
-        stopped = progress is not None and progress(state) is False
-        settled = enough is not None and (state.upper_bound < enough or state.value >= enough)
-        return False if stopped or settled else None
-
     found = search(
         seen,
         objective.target,
@@ -81,11 +76,12 @@ def best_rival(
         weights=np.where(elsewhere, objective.weights, 0.0),
         z_max=z_max,
         time_limit=time_limit,
-        progress=decided,
+        progress=progress,
+        enough=enough,
     )
-    if stopped:
+    if found.cancelled:
         return None
     whole = matching(seen, objective.target, objective.radius, weights=objective.weights)
     value = whole.value(found.mobius)
     mobius = replace(found.mobius, reflected=reflected)
-    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius))
+    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius), found.out_of_time)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ..matching import Matching, matching
 from ..mesh import Complexes, Floats
 from ..mobius import Mobius
-from ..search import SearchProgress, SearchResult, one_to_one
+from ..search import SearchProgress, SearchResult
 
 
 @dataclass
@@ -90,8 +90,8 @@ class Incumbent:
             seconds=time.perf_counter() - self._started,
             matches=self.problem.matches(self.mobius),
             cancelled=self.cancelled,
-            one_to_one=one_to_one(self.problem, self.mobius),
             kernels="numpy",
+            counted=(self.problem, self.mobius),
         )
 
 
