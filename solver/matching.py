@@ -28,7 +28,7 @@ GUARD = 2.0**-45
 MOST_EXACT = 4096
 """Pairs on the rim that one count decides in integers, some 10 us each; beyond, they do not count as matched."""
 
-PAIRS_AT_ONCE = 1 << 17
+PAIRS_AT_ONCE = 1 << 16
 """Pairs looked at in one go: a few milliseconds' work, after which a search may be called off."""
 
 MOST_PAIRS = (1 << 32) - 1
@@ -292,10 +292,7 @@ def matching(
     rows, unit = (None, 1.0) if weights is None else _rows(np.asarray(weights), (len(m), len(b)), check)
     found = Matching(m, centre, np.asarray(e), rows, unit, given)
     if found.count > MOST_PAIRS:
-        raise ValueError(
-            f"{found.count:,} pairs may match, more than the {MOST_PAIRS:,} that a search can hold: "
-            "take fewer points, or weights of 0 for pairs that cannot match"
-        )
+        raise _too_many(found.count)
     return found
 
 
@@ -308,27 +305,42 @@ def _rows(
     some = max(PAIRS_AT_ONCE // shape[1], 1)
     blocks = [slice(first, first + some) for first in range(0, shape[0], some)]
     plain = full = True
+    most = 0
     for block in blocks:
         check()
         part = np.asarray(table[block], dtype=np.float64)
         if not (part.min() >= 0 and part.max() <= 1):  # false for nan
             raise ValueError("every weight must lie in [0, 1]")
-        ones = part == 1
+        ones, some = part == 1, part > 0
+        most += int(np.count_nonzero(some))
         full = full and bool(ones.all())
-        plain = plain and bool((ones | (part == 0)).all())
+        plain = plain and bool((ones == some).all())
     if full:
         return None, 1.0
+    if most > MOST_PAIRS:
+        raise _too_many(most)
     unit = 1.0 if plain else 2.0 ** (shape[0].bit_length() - 31)
-    counts, targets, units = [], [], []
+    # filled block by block, so that no step is long
+    counts, target = np.zeros(shape[0] + 1, np.int64), np.empty(most, np.int32)
+    units, first = None if plain else np.empty(most, np.uint32), 0
     for block in blocks:
         check()
         part = np.round(np.asarray(table[block], dtype=np.float64) / unit)
         j, k = np.nonzero(part)
-        counts.append(np.bincount(j, minlength=len(part)))
-        targets.append(k.astype(np.int32))
-        units.append(part[j, k].astype(np.uint32))
-    start = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
-    return Rows(start, np.concatenate(targets), None if plain else np.concatenate(units)), unit
+        last = first + len(j)
+        counts[1:][block] = np.bincount(j, minlength=len(part))
+        target[first:last] = k
+        if units is not None:
+            units[first:last] = part[j, k]
+        first = last
+    return Rows(np.cumsum(counts), target[:first], None if units is None else units[:first]), unit
+
+
+def _too_many(count: int) -> ValueError:
+    return ValueError(
+        f"{count:,} pairs may match, more than the {MOST_PAIRS:,} that a search can hold: "
+        "take fewer points, or weights of 0 for pairs that cannot match"
+    )
 
 
 def _disc_points(points: npt.ArrayLike, role: str) -> Complexes:

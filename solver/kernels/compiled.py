@@ -148,11 +148,10 @@ class CompiledKernels:
             }
             typical = float(np.median(widest)) if len(row) else 1.0
         else:
-            disc, reach, units = _own_rows(problem, inner, outer, self._check)
+            disc, reach, units, typical = _own_rows(problem, inner, outer, widest, self._check)
             starts = problem.starts
             arrays |= {"start": starts[:-1], "stop": starts[1:], "discs": discs, "disc": disc, "reach": reach}
             arrays |= {"weight": units}
-            typical = _weighted_median(widest, problem)
         finest = 1
         levels = int(np.clip(np.ceil(np.log2(1 / (SHARPNESS * typical * ANGLES))) + 1, 1, MOST_LEVELS))
         if shared:
@@ -298,17 +297,22 @@ def _one_row(problem: Matching) -> Integers | None:
 
 
 def _own_rows(
-    problem: Matching, inner: Floats, outer: Floats, check: Callable[[], None]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return disc, running maximum of outer, rounded up, and weight of each pair, in an order by inner in each row."""
+    problem: Matching, inner: Floats, outer: Floats, widest: Floats, check: Callable[[], None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, float]:
+    """Return disc, running maximum of outer, rounded up, and weight of each pair, in an order by inner in each row.
+
+    And the median of `widest` over all pairs.
+    """
     assert problem.rows is not None
     target, units, starts = problem.rows.target, problem.rows.units, problem.starts
     disc, reach = np.empty(len(target), np.uint32), np.empty(len(target), np.float32)
     weight = None if problem.unit == 1 or units is None else np.empty(len(target), np.uint32)
+    often = np.zeros(len(widest), np.int64)
     for first, last in problem.blocks():
         check()
         a, b = int(starts[first]), int(starts[last])
         some = target[a:b]
+        often += np.bincount(some, minlength=len(often))
         order = np.lexsort([inner[some], np.repeat(np.arange(last - first), np.diff(starts[first : last + 1]))])
         disc[a:b] = some[order]
         if weight is not None and units is not None:
@@ -320,18 +324,16 @@ def _own_rows(
         if number * max(b - a, 1) % PAIRS_AT_ONCE < b - a:
             check()
         np.maximum.accumulate(reach[a:b], out=reach[a:b])
-    return disc, reach, weight
+    return disc, reach, weight, _median(widest, often)
 
 
-def _weighted_median(widest: Floats, problem: Matching) -> float:
-    """Return the median of `widest` over all pairs; 1 if there are none."""
-    assert problem.rows is not None
-    if problem.count == 0:
+def _median(x: Floats, often: np.ndarray) -> float:
+    """Return the median of numbers that occur so often; 1 if none does."""
+    order = np.argsort(x)
+    upto = np.cumsum(often[order])
+    if upto[-1] == 0:
         return 1.0
-    order = np.argsort(widest)
-    upto = np.cumsum(np.bincount(problem.rows.target, minlength=len(widest))[order])
-    middle = np.searchsorted(upto, [(problem.count - 1) // 2, problem.count // 2], side="right")
-    return float(np.mean(widest[order[middle]]))
+    return float(np.mean(x[order[np.searchsorted(upto, [(upto[-1] - 1) // 2, upto[-1] // 2], side="right")]]))
 
 
 def _sector(b: Floats, turn: Floats, rings: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ..bounds import Arcs, common_rotation, enclosing_arcs, exact_arcs
-from ..matching import PAIRS_AT_ONCE, Matching, nothing
+from ..matching import Matching, nothing
 from ..mesh import Complexes, Floats
 from ..stabbing import envelope, swept
 from ..watch import Halt, Halted, look
@@ -17,7 +17,7 @@ from .nodes import BOUND, HALF, WIDTH, X, Y, new_nodes
 CELLS_AT_ONCE = 64
 """Cells bounded in one go: enough to keep numpy busy, few enough to keep its arrays small."""
 
-MOST_AT_ONCE = 1 << 21
+MOST_AT_ONCE = 1 << 19
 """Cells times pairs in one go."""
 
 
@@ -41,7 +41,7 @@ def best_rotations(problem: Matching, z: Complexes, check: Callable[[], None] = 
 
 def _some(problem: Matching, count: int) -> list[slice]:
     """Cut `count` cells into as many as are looked at in one go."""
-    step = int(np.clip(MOST_AT_ONCE // max(min(problem.count, PAIRS_AT_ONCE), 1), 1, CELLS_AT_ONCE))
+    step = int(np.clip(MOST_AT_ONCE // max(problem.count, 1), 1, CELLS_AT_ONCE))
     return [slice(first, first + step) for first in range(0, count, step)]
 
 
