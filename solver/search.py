@@ -142,7 +142,7 @@ def search(
         state.begin(matching(source, target, radius, metric=metric, weights=weights, check=state.check), reflect)
         state.run(np.inf if time_limit is None else started + time_limit, threads or os.cpu_count() or 1)
 
-    state = _Search(z_max, float(np.size(source)), until)
+    state = _Search(float(z_max), float(np.size(source)), until)
     deadline = None if time_limit is None else started + time_limit
     tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
     cancelled = watched(work, state.halt, deadline, tell)

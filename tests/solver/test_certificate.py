@@ -6,7 +6,8 @@ import pytest
 from instances import disc_points, nasty_points, planted
 
 from solver import Mobius, search
-from solver.certificate import Certificate, _alive, _holds_exactly, _Pairs, _turn, certify
+from solver.certificate import Certificate, _alive, _holds_exactly, _Pairs, certify
+from solver.rational import turn
 
 
 def claim(found):
@@ -74,7 +75,7 @@ def test_a_pair_on_the_edge_of_its_disc_is_called_for_certain():
 
 @pytest.mark.parametrize("theta", [0.0, 1.0, -2.5, 3.14, 6.283, 9.0, 1e-9])
 def test_exponential_in_rational_numbers(theta):
-    (real, imag), off = _turn(theta)
+    (real, imag), off = turn(theta)
     assert off < Fraction(1, 1 << 100)
     assert abs(real * real + imag * imag - 1) <= 4 * off
     assert (float(real), float(imag)) == pytest.approx((np.cos(theta), np.sin(theta)), abs=1e-15)
