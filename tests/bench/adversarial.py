@@ -7,8 +7,8 @@ Run::
 A million cells, where everything is at the edge of what is allowed (tests/solver/attacks.py), go through every kind of
 bound there is: swept in numpy; pairs, raster, windows and searched subtrees of each compiled library that runs here. In
 each cell a transformation is known, and its value in exact arithmetic: no bound may be below it. Then searches of
-planted instances, with each library and in numpy: value and bound are held against the planted value and `certify`, some
-bounds against a proof by `certify`. It prints counts, and ends with 1 if there is a violation.
+planted instances, with each library and in numpy: value and bound are held against the planted value and `certify`,
+some bounds against a proof by `certify`. It prints counts, and ends with 1 if there is a violation.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ def cells_of(number: int, count: int) -> Counter[str]:
     return attack(rng, *cornered_problem(rng), count)
 
 
-def searched(number: int, time_limit: float | None = 0.5) -> Counter[str]:
+def searched(number: int, time_limit: float | None = 0.2) -> Counter[str]:
     """Search one instance by all kernels, and hold the outcome against what was planted and against `certify`."""
     rng = np.random.default_rng([number, 22])
     problem, planted, z_max = cornered_problem(rng, 6)

@@ -26,7 +26,7 @@ def test_no_search_claims_what_does_not_hold_exactly(seed):
 
 @pytest.mark.parametrize(("factor", "kinds"), [(1.01, 9), (1 + 1e-6, 7)])
 def test_the_attack_would_see_it(factor, kinds):
-    """Values of discs that are a little larger than those of the bounds count as violations, of sharp kinds at least."""
+    """Values of discs that are a little larger than those of the bounds are violations, of sharp kinds at least."""
     seen = set()
     for seed in range(60):
         rng = np.random.default_rng(seed)
