@@ -190,20 +190,31 @@ class Matching:
         image, spared = mobius(self.source), MOST_EXACT
         # the floor keeps a cancelled difference from looking exact
         guard = GUARD * (1 + 1 / np.maximum(np.abs(1 - np.conj(z) * self.source) - 2.0**-50, 2.0**-50))
+        farthest = self.radii + guard.max()
         for first, last in self.blocks():
             check()
-            point = np.repeat(np.arange(first, last), np.diff(self.starts[first : last + 1]))
-            target = self._targets(first, last)
-            distance = np.abs(image[point] - self.centres[target])
+            pair, point, target, distance = self._apart(first, last, image, farthest)
             beyond = distance - self.radii[target]
-            near = np.flatnonzero(beyond <= guard[point])
-            close = near[beyond[near] >= -guard[point[near]]]
+            sure = beyond < -guard[point]
+            close = np.flatnonzero((beyond <= guard[point]) & ~sure)
             if len(close):
-                sure = beyond < -guard[point]
                 some, spared = close[:spared], max(spared - len(close), 0)
                 sure[some] = self._surely(mobius, point[some], target[some])
-                near = np.flatnonzero(sure)
-            yield near + self.starts[first], point[near], target[near], distance[near]
+            yield pair[sure], point[sure], target[sure], distance[sure]
+
+    def _apart(
+        self, first: int, last: int, image: Complexes, farthest: Floats
+    ) -> tuple[Integers, Integers, Integers, Floats]:
+        """Return the pairs of source points first to last - 1 that are no farther apart, and their distances."""
+        if self.rows is None:
+            table = np.abs(image[first:last, None] - self.centres)
+            point, target = np.nonzero(table <= farthest)
+            return (point + first) * len(self.centres) + target, point + first, target, table[point, target]
+        point = np.repeat(np.arange(first, last), np.diff(self.starts[first : last + 1]))
+        target = self._targets(first, last)
+        distance = np.abs(image[point] - self.centres[target])
+        pair = np.flatnonzero(distance <= farthest[target])
+        return pair + self.starts[first], point[pair], target[pair], distance[pair]
 
     def _surely(self, mobius: Mobius, point: Integers, target: Integers) -> npt.NDArray[np.bool_]:
         discs = self.given or Discs(self.centres, self.radii, False)

@@ -65,6 +65,7 @@ def search(
     progress: Callable[[SearchProgress], bool | None] | None = None,
     gap: float = 0.0,
     enough: float | None = None,
+    at_least: int = 0,
 ) -> SearchResult:
     """Find the Möbius transformation that brings the greatest weight of source points into match discs of the target.
 
@@ -97,6 +98,8 @@ def search(
         a last percent that takes most of the time.
     enough : float, optional
         The search ends as soon as it is decided whether some transformation reaches this value.
+    at_least : int
+        Cells whose bound is computed before `enough` or `gap` ends the search: what is small is finished.
 
     Returns
     -------
@@ -134,9 +137,9 @@ def search(
         raise ValueError(f"gap must be a share of the value, 0 or more, not {gap}")
     started = time.perf_counter()
 
-    def until(value: float, bound: float) -> bool:
+    def until(value: float, bound: float, nodes: int) -> bool:
         decided = enough is not None and (value >= enough or bound < enough)
-        return decided or (gap > 0 and bound <= value * (1 + gap))
+        return nodes >= at_least and (decided or (gap > 0 and bound <= value * (1 + gap)))
 
     def work() -> None:
         state.begin(matching(source, target, radius, metric=metric, weights=weights, check=state.check), reflect)
@@ -152,7 +155,7 @@ def search(
 class _Search:
     """The state of one search: the best transformation so far, and the cells that may hold a better one."""
 
-    def __init__(self, z_max: float, limit: float, until: Callable[[float, float], bool]) -> None:
+    def __init__(self, z_max: float, limit: float, until: Callable[[float, float, int], bool]) -> None:
         self.z_max, self.until = z_max, until
         self.halt = np.zeros(1, np.int32)
         self.sides: list[Matching] = []
@@ -220,7 +223,7 @@ class _Search:
             # cells that ended undecided may turn out worthless: another may yet reach their bound
             while any(map(len, self.frontier)):
                 self.proved = self.value, self.upper_bound, self.nodes
-                if self.until(self.value, self.upper_bound):
+                if self.until(*self.proved):
                     break
                 if time.perf_counter() > deadline:
                     self.out_of_time = True
