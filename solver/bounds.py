@@ -41,8 +41,10 @@ above is off by less than 2^-46 / F of itself, or of 1 if smaller; arctangents b
 and to modulus bounds is 2^-42 / F, sixteen times that; the disc of eq. 20-22, whose denominator
 `span` = F^2 - |m|^2 r^2 may cancel, gets 2^-42 (1 + its largest modulus) / span, and is not used for F < 2^-16 or
 s2 > 1 - 2^-10, where any rotation and any modulus is allowed. Arc sines of what shrinks with the cell are replaced by
-polynomials that exceed them. A bound therefore also covers what `Matching.value` counts by rounding: an image is
-computed to 2^-49 / F, less than the slack.
+polynomials that exceed them. So a bound holds for what is matched in exact arithmetic, by the discs as they were given:
+their centres and radii are off by d < 2^-47 (`mobius.hyperbolic_disc`), which moves |b| -+ e by 2 d, arg b, where an
+arc is not the full circle, by less than the slack of its half-width, and e^2 - (|b| - rho)^2 as much as 2 d does if
+added to rho: less than the slack of rho, the nearest or farthest modulus.
 """
 
 from __future__ import annotations
