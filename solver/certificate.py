@@ -46,8 +46,8 @@ class Certificate:
         by a transformation of those that were searched: |z| <= z_max, and reflected only where that was allowed.
     bound_holds : bool or None
         Whether no transformation was shown to exceed the claimed upper bound: True if proved over the whole domain,
-        False if the boxes ran out before, or if the bound is below what `mobius` certainly reaches. None if not asked
-        for.
+        False if the boxes ran out before, and if the bound is no finite number or below what `mobius` certainly
+        reaches. None if not asked for.
     boxes : int
         Boxes of the final cover.
     objections : tuple of str

@@ -117,7 +117,8 @@ def search(
     instead of the best, depth first, until there are fewer. On top come 8 MB per thread for lists of pairs, and a
     raster of the target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB. Pairs take
     nothing if all may match with weight 1, else 20 bytes for each of positive weight; 2^32 are refused. While one
-    transformation is looked at, 30 MB more. Without the compiled kernels, some 500 MB.
+    transformation is looked at, 30 MB more. Without the compiled kernels, up to 300 bytes for every pair that some
+    rotation matches, whatever its weight.
 
     Examples
     --------
