@@ -70,6 +70,11 @@ class SearchResult:
         """How much better a transformation could still be: upper_bound - value."""
         return self.upper_bound - self.value
 
+    @property
+    def relative_gap(self) -> float:
+        """The gap as a share of the value, as `search` takes it."""
+        return self.gap / self.value if self.value > 0 else (np.inf if self.gap > 0 else 0.0)
+
     @cached_property
     def one_to_one(self) -> float:
         """The greatest weight of pairs within reach under `mobius` that share neither source nor target point.

@@ -143,6 +143,8 @@ def test_a_gap_that_is_allowed_ends_the_search_earlier():
     assert near.nodes < whole.nodes
     assert not near.certified
     assert whole.value <= near.upper_bound <= 1.1 * near.value
+    assert 0 < near.relative_gap <= 0.1
+    assert whole.relative_gap == 0
     assert (near.cancelled, near.out_of_time) == (False, False)
     with pytest.raises(ValueError, match="gap must be a share"):
         search(source, target, 0.05, gap=-0.1)
