@@ -55,7 +55,7 @@ def cornered_problem(rng: np.random.Generator, most: int = 8) -> tuple[Matching,
     target = np.where(rng.random(n2) < 0.5, image, target)
     metric = str(rng.choice(["hyperbolic", "euclidean"]))
     hyperbolic = metric == "hyperbolic"
-    target *= np.minimum(1, (1 - 2.0**-52 if hyperbolic else 1) / np.maximum(np.abs(target), 1e-300))
+    target *= np.minimum(1, (1 - 2.0**-51 if hyperbolic else 1) / np.maximum(np.abs(target), 1e-300))
     radius = 10.0 ** rng.uniform(-12, -0.1, n2)
     wide = rng.random(n2) < 0.2
     radius[wide] = near_one(rng, wide.sum(), 1e-15) if hyperbolic else rng.uniform(0.5, 2, wide.sum())
