@@ -266,9 +266,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
     """Draw how far the work under way is, and what it has proved."""
     row = layout.row(align=True)
-    row.progress(factor=job.progress.fraction, text=iface_(job.progress.stage))
+    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
     row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
-    layout.label(text=describe_proof(job.progress) or iface_("ESC stops"), translate=False)
+    layout.label(text=job.waits or describe_proof(job.progress) or iface_("ESC stops"), translate=False)
 
 
 def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:

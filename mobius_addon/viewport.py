@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver.mesh import Floats
 
@@ -89,14 +90,35 @@ def look_at_all_again(context: bpy.types.Context) -> None:
         _toggle_local_view(context)
 
 
-def edit(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """Go to Edit Mode of an object and, where there is a window, look at what is selected of it."""
+def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
+    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it.
+
+    Returns
+    -------
+    str or None
+        Why that is not possible, and nothing was done; None if it was.
+    """
+    layer, space = context.view_layer, space_of(context)
+    layer.update()
+    if layer.objects.get(obj.name) != obj:
+        text = rpt_("'{}' is in no collection of this view layer: include its collection in the Outliner to see them")
+        return text.format(obj.name)
+    hidden = obj.hide_get()
     obj.hide_set(False)
-    context.view_layer.objects.active = obj
+    if not obj.visible_get():
+        obj.hide_set(hidden)
+        text = rpt_("'{}' is disabled in viewports, or its collection is hidden: show it in the Outliner to see them")
+        return text.format(obj.name)
+    if space is not None and space.local_view:
+        obj.local_view_set(space, True)
+    for other in layer.objects:  # what is selected would go to Edit Mode too
+        other.select_set(other == obj)
+    layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    if space_of(context) is not None:
+    if space is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()
+    return None
 
 
 def _toggle_local_view(context: bpy.types.Context) -> None:

@@ -13,7 +13,7 @@ from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..mesh_data import Refusal, foreach, read_surface
 from ..results import pattern_color, read_layout, require_room, write_color
-from ..usable import why_not, why_not_aligned
+from ..usable import why_not_aligned
 
 COLLECTION = "Mobius Side by Side"
 
@@ -31,8 +31,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned."""
-        settings, scene = context.scene.mobius, context.scene
-        reason = why_not(settings.source, "source mesh", scene) or why_not_aligned(settings, scene)
+        reason = why_not_aligned(context, writes_source=True)
         if reason:
             cls.poll_message_set(reason)
         return not reason
