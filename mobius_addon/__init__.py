@@ -8,10 +8,13 @@ from importlib import import_module
 # in the order in which they register; each has `register` and `unregister`
 _TOOLS = (
     "edits",
+    "fingerprints",
     "topology_cache",
     "overlay",
     "preferences",
     "properties",
+    "earlier_version",
+    "deleted",
     "jobs",
     "operators",
     "preset_menus",

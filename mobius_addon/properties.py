@@ -30,9 +30,15 @@ class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.Prope
 
 
 class MobiusAlignment(bpy.types.PropertyGroup):
-    """The last alignment of a mesh as target, as `stored_alignment` keeps it."""
+    """The last alignment of a mesh as target, as `stored_alignment` keeps it.
 
-    source: bpy.props.PointerProperty(type=bpy.types.Object)
+    The source is told by its name, its number of vertices and its fingerprint: a pointer would keep it in the file for
+    ever.
+    """
+
+    source: bpy.props.PointerProperty(type=bpy.types.Object)  # of version 0.1 only: see `earlier_version`
+    source_name: bpy.props.StringProperty()
+    source_size: bpy.props.IntProperty()
     source_fingerprint: bpy.props.StringProperty()
     target_fingerprint: bpy.props.StringProperty()
     value: bpy.props.FloatProperty()
