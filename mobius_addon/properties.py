@@ -1,4 +1,8 @@
-"""What the extension keeps: choices in the scene, the last alignment on the target's mesh, what the overlay draws."""
+"""What the extension keeps.
+
+Choices in the scene; on a mesh its last alignment as target, and which layers were active before ours; what the overlay
+draws.
+"""
 
 # no postponed annotations here: Blender reads the properties from them
 import bpy
@@ -107,12 +111,14 @@ def register() -> None:
     _register_classes()
     bpy.types.Scene.mobius = bpy.props.PointerProperty(type=MobiusSettings)
     bpy.types.Mesh.mobius_alignment = bpy.props.PointerProperty(type=MobiusAlignment)
+    bpy.types.Mesh.mobius_before = bpy.props.StringProperty()  # as `attributes.note` keeps it
     bpy.types.WindowManager.mobius_view = bpy.props.PointerProperty(type=MobiusView)
 
 
 def unregister() -> None:
     """Undo `register`."""
     del bpy.types.WindowManager.mobius_view
+    del bpy.types.Mesh.mobius_before
     del bpy.types.Mesh.mobius_alignment
     del bpy.types.Scene.mobius
     _unregister_classes()

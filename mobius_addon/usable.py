@@ -38,13 +38,25 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
         return text.format(obj.name, called)
     if not is_in_scene(obj, scene):
         return rpt_("'{}' is not in this scene: choose another {}").format(obj.name, called)
+    return _why_not_read(obj) or (why_not_written(obj) if writes else None)
+
+
+def _why_not_read(obj: bpy.types.Object) -> str | None:
+    """Return why the mesh of an object cannot be read, or None if it can."""
     if obj.mode != "OBJECT":
         mode = obj.mode.replace("_", " ").title()
         return rpt_("'{}' is in {} Mode: switch to Object Mode first").format(obj.name, mode)
     if obj.data.is_editmode:
         text = rpt_("'{}' shares its mesh with an object in Edit Mode: switch to Object Mode first")
         return text.format(obj.name)
-    if writes and not (obj.is_editable and obj.data.is_editable):
+    return None
+
+
+def why_not_written(obj: bpy.types.Object) -> str | None:
+    """Return why a mesh object of any scene cannot be changed, or None if it can."""
+    if reason := _why_not_read(obj):
+        return reason
+    if not (obj.is_editable and obj.data.is_editable):
         text = rpt_("'{}' is linked from another file: make it local first (Object > Relations > Make Local)")
         return text.format(obj.name)
     return None

@@ -10,6 +10,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver.mesh import Floats
 
+# type and color of the shading that viewports had before they showed our colors; of the session
+_before: dict[int, tuple[str, str]] = {}
+
 
 def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
     """Return the 3D viewport of the context, or else the largest one; None without a window, as in scripts."""
@@ -33,10 +36,30 @@ def show_colors(context: bpy.types.Context) -> None:
     space = space_of(context)
     if space is None:
         return
-    if space.shading.type in ("WIREFRAME", "SOLID"):
-        space.shading.type = "SOLID"
-        space.shading.color_type = "VERTEX"
+    shading = space.shading
+    if shading.type in ("WIREFRAME", "SOLID"):
+        if (shading.type, shading.color_type) != ("SOLID", "VERTEX"):
+            _before[space.as_pointer()] = shading.type, shading.color_type
+        shading.type = "SOLID"
+        shading.color_type = "VERTEX"
     context.window_manager.mobius_view.legend = True
+
+
+def show_as_before(context: bpy.types.Context) -> None:
+    """Undo `show_colors` in every viewport that still shows them, and take the overlay's pictures away."""
+    for screen in bpy.data.screens:
+        for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
+            before = _before.pop(space.as_pointer(), None)
+            if before and (space.shading.type, space.shading.color_type) == ("SOLID", "VERTEX"):
+                space.shading.color_type = before[1]
+                space.shading.type = before[0]
+    view = context.window_manager.mobius_view
+    view.matches = view.discs = view.legend = False
+
+
+def forget_shading() -> None:
+    """Forget what viewports showed before: they are gone."""
+    _before.clear()
 
 
 def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:

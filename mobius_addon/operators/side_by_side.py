@@ -110,9 +110,20 @@ def is_shown(context: bpy.types.Context) -> bool:
 
 def end(context: bpy.types.Context) -> None:
     """Remove the copies, if there are any; the meshes stay."""
-    if not is_shown(context):
-        return
-    collection = bpy.data.collections[COLLECTION]
+    if is_shown(context):
+        _remove(context.scene.collection.children[COLLECTION])
+
+
+def end_for(mesh: bpy.types.Mesh) -> bool:
+    """Remove the copies from every scene that shows this mesh side by side, and return whether there were any."""
+    shown = [scene.collection.children.get(COLLECTION) for scene in bpy.data.scenes]
+    found = {x for x in shown if x is not None and x.is_editable and any(obj.data == mesh for obj in x.objects)}
+    for collection in found:
+        _remove(collection)
+    return bool(found)
+
+
+def _remove(collection: bpy.types.Collection) -> None:
     for obj in list(collection.objects):
         bpy.data.objects.remove(obj)
     bpy.data.collections.remove(collection)
