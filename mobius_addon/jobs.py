@@ -193,8 +193,9 @@ class JobOperator:
         """Answer Repeat Last, a new wish for what is chosen now, by an operator of its own, which may become modal."""
         names = [prop.identifier for prop in self.properties.bl_rna.properties if prop.identifier != "rna_type"]
         given = {name: getattr(self, name) for name in names if self.properties.is_property_set(name)}
+        name = self.bl_idname.partition("_OT_")[2]  # a registered class has it as Blender spells types
         try:
-            getattr(bpy.ops.mobius, self.bl_idname.partition(".")[2])("INVOKE_DEFAULT", True, **given)
+            getattr(bpy.ops.mobius, name)("INVOKE_DEFAULT", True, **given)
         except RuntimeError as error:  # it was refused
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return {"CANCELLED"}

@@ -67,10 +67,12 @@ class ActiveLayers:
             maps[self.uv_clone].active_clone = True
         if self.uv_stencil in maps:
             mesh.uv_layer_stencil = maps[self.uv_stencil]
-        if self.color in mesh.color_attributes:
-            attributes.active_color_name = self.color
-        if self.color_render in mesh.color_attributes:
-            attributes.default_color_name = self.color_render
+        for prop, name in (("active_color_name", self.color), ("default_color_name", self.color_render)):
+            names = [x.name for x in mesh.color_attributes]
+            if name in names:
+                setattr(attributes, prop, name)
+            elif getattr(attributes, prop) not in names:  # from Blender 5 on the name of a removed one stays
+                setattr(attributes, prop, next(iter(names), ""))
         if self.group in groups:
             groups.active = groups[self.group]
 

@@ -120,6 +120,8 @@ def test_a_layer_that_is_gone_is_no_harm() -> None:
     assert bpy.ops.mobius.clear() == {"FINISHED"}
     assert traces() == []
     assert mesh.uv_layers.active.name in ("UV a", "UV c")
+    # nor is the name of a removed color kept
+    assert pair[0].data.attributes.active_color_name in pair[0].data.color_attributes
 
 
 def test_something_of_another_kind_under_our_name_is_not_ours() -> None:

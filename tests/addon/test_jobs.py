@@ -207,7 +207,7 @@ def test_the_redo_panel_repeats_without_becoming_modal() -> None:
 def test_repeat_last_is_an_operator_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     operator, window = Operator(), Window()
     operator.options = SimpleNamespace(is_invoke=True, is_repeat=False, is_repeat_last=True)
-    operator.bl_idname, operator.limit, operator.mix = "mobius.test", 3, "add"
+    operator.bl_idname, operator.limit, operator.mix = "MOBIUS_OT_test", 3, "add"
     rna = SimpleNamespace(properties=[SimpleNamespace(identifier=name) for name in ("rna_type", "limit", "mix")])
     operator.properties = SimpleNamespace(bl_rna=rna, is_property_set=lambda name: name != "mix")
     called: list[Any] = []

@@ -40,13 +40,14 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     def reaches(wanted: float) -> Any:
         return lambda: jobs.Job.current is None and abs(weight() - wanted) < 0.02 * abs(wanted)
 
+    def transfer() -> Wait:
+        yield from click_on((yield from find("bpy.ops.mobius.transfer", upwards=True)))
+        yield from until(lambda: jobs.Job.current is None and weight() > 0)
+        yield 1.0
+
     undo()
     yield from until(lambda: weight() == -1)
-    transfer = yield from find("bpy.ops.mobius.transfer", upwards=True)
-    yield from click_on(transfer)
-    yield from until(lambda: jobs.Job.current is None and weight() > 0)
-    yield 1.0
-    yield from every_way_to_redo("transfer", weight, reaches)
+    yield from every_way_to_redo("transfer", transfer, weight, reaches)
     assert not searches, "a transfer needs no search"
 
     # as it was before any alignment, whose result is known no more
@@ -59,17 +60,18 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
         obj.select_set(obj in (source, target))
     bpy.context.view_layer.objects.active = target
     bpy.ops.ed.undo_push(message="selection")
-    over_the_viewport()
-    pointer("key", "F3")
-    yield 1.0
-    pointer("type", "--delay", "40", "Transfer by Conformal")
-    yield 1.0
-    pointer("key", "Return")
-    yield from until(lambda: jobs.Job.current is not None)
-    yield from until(lambda: jobs.Job.current is None and weight() > 0)
-    yield 1.0
-    assert len(searches) == 1
-    yield from every_way_to_redo("conformal-transfer", weight, reaches)
+
+    def conformal_transfer() -> Wait:
+        over_the_viewport()
+        pointer("key", "F3")
+        yield 1.0
+        pointer("type", "--delay", "40", "Transfer by Conformal")
+        yield 1.0
+        pointer("key", "Return")
+        yield from until(lambda: jobs.Job.current is None and weight() > 0)
+        yield 1.0
+
+    yield from every_way_to_redo("conformal-transfer", conformal_transfer, weight, reaches)
     assert len(searches) == 1, "a redo has searched again"
     align.aligned = computed
     # to where this began
@@ -78,40 +80,52 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     yield 1.0
 
 
-def every_way_to_redo(name: str, weight: Any, reaches: Any) -> Wait:
-    """Change the factor by which weights are mixed in, by all ways that Blender offers, and undo all."""
+def every_way_to_redo(name: str, run: Any, weight: Any, reaches: Any) -> Wait:
+    """Run an operator and change the factor by which weights are mixed in, by all ways that Blender offers."""
+    yield from run()
     whole = weight()
     yield from show_panel()
     for factor in (0.5, 0.8):
         yield from set_factor(panel_rows(), factor)
         yield from quickly(reaches(factor * whole), f"{name}, redo panel")
     yield from picture(f"redo-{name}")
-    undo()
-    yield from until(lambda: weight() == -1)
-    yield 0.5
-    redo()
-    yield from until(reaches(0.8 * whole))
-    yield 0.5
-    # undo has closed the panel: Blender offers it again by F9
     over_the_viewport()
     pointer("key", "F9")
     yield 1.0
     part = hand.region("WINDOW")
     x, y = part.x + part.width // 3 + 200, screen_height() - part.y - 40
-    for factor in (0.25, 0.5):
-        yield from set_factor([(x, y + 120 - hand.STEP * row) for row in range(35)], factor)
-        yield from quickly(reaches(factor * whole), f"{name}, F9 after undo and redo")
-    yield from picture(f"redo-{name}-f9")
+    yield from set_factor([(x, y + 120 - hand.STEP * row) for row in range(35)], 0.25)
+    yield from quickly(reaches(0.25 * whole), f"{name}, F9")
     pointer("mousemove", part.x + 20, screen_height() - part.y - part.height // 2)  # away from it, which closes it
     yield 1.0
-    # once more on what is there: half of the way from a half
+    # once more on what is there: a quarter of the way that is left
     pointer("key", "shift+r")
-    yield from until(reaches(0.75 * whole))
+    yield from until(reaches((0.25 + 0.75 * 0.25) * whole))
+    yield 1.0
+    yield from show_panel()
+    yield from set_factor(panel_rows(), 0.5)
+    yield from quickly(reaches((0.25 + 0.75 * 0.5) * whole), f"{name}, redo panel of Repeat Last")
+
+    undo()
+    yield from until(reaches(0.25 * whole))
     yield 0.5
-    for expected in (0.5 * whole, -1.0):
-        undo()
-        yield from until(lambda expected=expected: abs(weight() - expected) <= 0.02 * abs(expected))
-        yield 0.5
+    undo()
+    yield from until(lambda: weight() == -1)
+    yield 0.5
+    redo()
+    yield from until(reaches(0.25 * whole))
+    yield 0.5
+    undo()
+    yield from until(lambda: weight() == -1)
+    yield 0.5
+    # undo has closed the panel
+    yield from run()
+    yield from show_panel()
+    yield from set_factor(panel_rows(), 0.5)
+    yield from quickly(reaches(0.5 * whole), f"{name}, redo panel after undo and redo")
+    undo()
+    yield from until(lambda: weight() == -1)
+    yield 0.5
 
 
 def quickly(happened: Any, what: str) -> Wait:
