@@ -38,8 +38,9 @@ def _on_file(*_: object) -> None:
 
 
 def _handlers() -> list[list]:
-    # what is appended or linked comes without load_post; Blender 4.2 says nothing of it
-    return [bpy.app.handlers.load_post, *filter(None, [getattr(bpy.app.handlers, "blend_import_post", None)])]
+    # what is appended comes without load_post, and in Blender 4.2 without a word: then it is seen to when it is saved
+    appended = getattr(bpy.app.handlers, "blend_import_post", None)
+    return [bpy.app.handlers.load_post, bpy.app.handlers.save_pre, *([] if appended is None else [appended])]
 
 
 def register() -> None:

@@ -49,6 +49,10 @@ class Job:
     ----------
     waits : str or None
         What the finished result waits for before it is written.
+    told : int or None
+        Number of the workspace whose status bar speaks of it.
+    timer : bpy.types.Timer or None
+        What wakes its operator in the window.
     """
 
     current: ClassVar[Job | None] = None
@@ -58,6 +62,8 @@ class Job:
         self.title = title
         self.progress = Progress(n_("Starting"), 0.0)
         self.waits: str | None = None
+        self.told: int | None = None
+        self.timer: Any = None
         self.result: Any = None
         self.error: BaseException | None = None
         self._work = work
@@ -141,8 +147,7 @@ class JobOperator:
         if in_window and not self.options.is_repeat:
             self._job = Job.current = Job(work, self.job_title)
             self._shown: tuple[str, int] | None = None
-            self._told: int | None = None
-            self._timer = manager.event_timer_add(INTERVAL, window=context.window)
+            self._job.timer = manager.event_timer_add(INTERVAL, window=context.window)
             manager.modal_handler_add(self)
             redraw(context)
             return {"RUNNING_MODAL"}
@@ -213,23 +218,18 @@ class JobOperator:
         now = ": ".join(filter(None, (iface_(self.job_title), stage, self._job.waits or describe_proof(progress))))
         shown = now, round(100 * progress.fraction)
         workspace = context.workspace
-        if shown != self._shown or workspace.session_uid != self._told:
-            if workspace.session_uid != self._told:  # the text belongs to a workspace, and another is shown now
-                self._clear_status()
-            self._shown, self._told = shown, workspace.session_uid
+        if shown != self._shown or workspace.session_uid != self._job.told:
+            if workspace.session_uid != self._job.told:  # the text belongs to a workspace, and another is shown now
+                clear_status(self._job)
+            self._shown, self._job.told = shown, workspace.session_uid
             workspace.status_text_set(f"{now}   |   {iface_('ESC: Stop')}")
             redraw(context)
 
-    def _clear_status(self) -> None:
-        if self._told is not None and (workspace := by_uid(bpy.data.workspaces, self._told)) is not None:
-            workspace.status_text_set(None)
-        self._told = None
-
     def _close(self, context: bpy.types.Context) -> None:
-        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.event_timer_remove(self._job.timer)
         if Job.current is self._job:
             Job.current = None
-        self._clear_status()
+        clear_status(self._job)
         redraw(context)
 
     def _refused(self, error: Exception) -> set[str]:
@@ -239,6 +239,13 @@ class JobOperator:
     def _stopped(self) -> set[str]:
         self.report({"INFO"}, rpt_("{} stopped: nothing was changed").format(rpt_(self.job_title)))
         return {"CANCELLED"}
+
+
+def clear_status(job: Job) -> None:
+    """Have the status bar say what it says by itself, in the workspace where it spoke of the job."""
+    if job.told is not None and (workspace := by_uid(bpy.data.workspaces, job.told)) is not None:
+        workspace.status_text_set(None)
+    job.told = None
 
 
 def redraw(context: bpy.types.Context, types: tuple[str, ...] = ("VIEW_3D",)) -> None:
@@ -282,5 +289,8 @@ def unregister() -> None:
     """Undo `register`, and stop the work under way: Blender quits or the extension is switched off."""
     if Job.current is not None:
         Job.current.cancel()
+        # Blender takes the operator away without a word to it
+        clear_status(Job.current)
+        bpy.context.window_manager.event_timer_remove(Job.current.timer)
         Job.current = None
     _unregister()

@@ -281,14 +281,13 @@ def test_files_of_version_0_1_are_read_and_their_pointer_is_dropped(pair: tuple[
     bpy.ops.mobius.align(**QUICK)
     as_version_0_1_kept_it(*pair)
     path = str(tmp_path / "earlier.blend")
-    handlers = bpy.app.handlers.load_post
-    handlers.remove(earlier_version._on_file)
+    earlier_version.unregister()
     try:  # as that version left it
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.open_mainfile(filepath=path)
         assert bpy.data.objects["Target"].data.mobius_alignment.source == bpy.data.objects["Source"]
     finally:
-        handlers.append(earlier_version._on_file)
+        earlier_version.register()
     bpy.ops.wm.open_mainfile(filepath=path)
     source, target = bpy.data.objects["Source"], bpy.data.objects["Target"]
     kept = target.data.mobius_alignment
@@ -305,11 +304,25 @@ def test_files_of_version_0_1_are_read_and_their_pointer_is_dropped(pair: tuple[
     assert "Source" not in bpy.data.meshes
 
 
+def test_the_pointer_of_version_0_1_is_dropped_from_what_is_saved(pair: tuple[Any, Any], tmp_path: Any) -> None:
+    # as of a mesh that was appended, or open when the extension was updated
+    bpy.ops.mobius.align(**QUICK)
+    as_version_0_1_kept_it(*pair)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    kept = pair[1].data.mobius_alignment
+    assert (kept.source, kept.source_name) == (None, "Source")
+    assert stored_alignment.exists(pair[1], pair[0])
+
+
 def test_a_linked_target_of_version_0_1_is_known_by_its_pointer(pair: tuple[Any, Any], tmp_path: Any) -> None:
     bpy.ops.mobius.align(**QUICK)
     as_version_0_1_kept_it(*pair)
     path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    earlier_version.unregister()
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+    finally:
+        earlier_version.register()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(path, link=True) as (_, wanted):
         wanted.objects = ["Source", "Target"]

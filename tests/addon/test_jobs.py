@@ -144,12 +144,16 @@ def test_the_panels_button_stops_like_esc() -> None:
 def test_the_end_of_the_file_or_the_extension_ends_the_work(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     operator, window = Operator(), Window()
     operator.execute(window)
+    assert operator.heard.wait(5)
+    operator.modal(window, event("TIMER"))
+    assert window.status[-1] is not None
     if way == "another file":
         operator.cancel(window)
-        assert (window.timers, window.status[-1]) == (0, None)
     else:
         monkeypatch.setattr(jobs, "_unregister", lambda: None)
+        jobs.bpy.context = SimpleNamespace(window_manager=window)
         jobs.unregister()
+    assert (window.timers, window.status[-1]) == (0, None)
     assert jobs.Job.current is None
     operator.free.set()
     ended(operator)

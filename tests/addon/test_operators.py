@@ -639,6 +639,18 @@ def test_a_mesh_that_is_edited_through_another_object_is_refused_and_stays(pair:
     assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
 
 
+def test_an_object_has_its_number_through_undo_redo_and_a_new_name(pair: tuple[Any, Any]) -> None:
+    # what a job that goes on meanwhile finds its objects by
+    before = [obj.session_uid for obj in pair]
+    bpy.ops.ed.undo_push(message="begin")
+    pair[0].name = "Renamed"
+    bpy.ops.ed.undo_push(message="renamed")
+    bpy.ops.ed.undo()
+    assert [bpy.data.objects[name].session_uid for name in ("Source", "Target")] == before
+    bpy.ops.ed.redo()
+    assert [bpy.data.objects[name].session_uid for name in ("Renamed", "Target")] == before
+
+
 def test_a_failure_in_edit_mode_never_removes_the_object(pair: tuple[Any, Any]) -> None:
     from mobius_extension.mobius_addon.attributes import restored_on_failure
 

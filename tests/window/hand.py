@@ -24,10 +24,10 @@ shot: Callable[[str], None]
 
 
 def until(happened: Any, every: float = 0.1) -> Wait:
-    """Wait for something, a minute at most."""
-    end = time.monotonic() + 60
+    """Wait for something, two minutes at most."""
+    end = time.monotonic() + 120
     while not happened():
-        assert time.monotonic() < end, "nothing happened in a minute"
+        assert time.monotonic() < end, "nothing happened in two minutes"
         yield every
 
 

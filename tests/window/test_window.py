@@ -35,7 +35,7 @@ def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("suite", ["sid", "trixie"])
 def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     if os.environ.get("MOBIUS_WINDOW") != "1":
@@ -51,7 +51,7 @@ def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest,
         "SUITE": suite,
         "GUI_TAB": "Möbius",
         "GUI_SIZE": "1600x1300",
-        "GUI_TIMEOUT": "780",
+        "GUI_TIMEOUT": "1500",
         "MOBIUS_SHOTS": str(shots),
     }
     done = subprocess.run(
