@@ -36,7 +36,7 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Take what was chosen in the panel, where the caller says nothing else."""
         for name in (*ALIGN_OPTIONS, *SCAN_OPTIONS, *TRANSFER_OPTIONS):
-            if not self.properties.is_property_set(name, ghost=False):
+            if not self.properties.is_property_set(name):  # what Blender remembers of the last time counts as not set
                 setattr(self, name, getattr(context.scene.mobius, name))
         return self.execute(context)
 
