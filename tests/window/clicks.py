@@ -84,6 +84,7 @@ def steps() -> Wait:
     yield from meanwhile.steps(PACKAGE, names)
 
     view = bpy.context.window_manager.mobius_view
+    look = bpy.context.space_data.shading.type, bpy.context.space_data.shading.color_type
     view.matches = True
     yield from picture("matches")
     view.matches = False
@@ -103,6 +104,20 @@ def steps() -> Wait:
     yield from picture("german")
     bpy.context.preferences.view.language = "en_US"
     yield 0.5
+
+    shading = bpy.context.space_data.shading
+    assert (shading.type, shading.color_type) == ("SOLID", "VERTEX") != look
+    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    bpy.ops.mobius.clear("EXEC_DEFAULT", True)
+    yield from picture("cleared")
+    assert bpy.context.space_data.local_view is None
+    assert (shading.type, shading.color_type) == look, "the viewport looks otherwise than before"
+    assert [view.matches, view.discs, view.legend] == [False] * 3
+    for name in names:
+        found = state(bpy.data.objects[name])
+        assert not found["aligned"]
+        assert not [x for x in (*found["groups"], *(x[0] for x in found["attributes"])) if "Mobius" in x]
 
     # another file in the middle of the work
     bpy.ops.mobius.align("INVOKE_DEFAULT", samples=99)  # what was asked before is known
