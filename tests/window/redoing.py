@@ -91,10 +91,13 @@ def every_way_to_redo(name: str, run: Any, weight: Any, reaches: Any) -> Wait:
     yield from picture(f"redo-{name}")
     over_the_viewport()
     pointer("key", "F9")
-    yield 1.0
+    yield 2.0
     part = hand.region("WINDOW")
     x, y = part.x + part.width // 3 + 200, screen_height() - part.y - 40
-    yield from set_factor([(x, y + 120 - hand.STEP * row) for row in range(35)], 0.25)
+    # from the middle, for the panel goes away when the mouse leaves it
+    yield from set_factor(
+        sorted(((x, y + hand.STEP * row) for row in range(-30, 11)), key=lambda at: abs(at[1] - y)), 0.25
+    )
     yield from quickly(reaches(0.25 * whole), f"{name}, F9")
     pointer("mousemove", part.x + 20, screen_height() - part.y - part.height // 2)  # away from it, which closes it
     yield 1.0
