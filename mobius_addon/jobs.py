@@ -123,6 +123,7 @@ class JobOperator:
     properties: Any
     report: Callable[[set[str], str], None]
     objects_read: tuple[int, ...] = ()
+    _scene: int | None = None
 
     def prepare(self, context: bpy.types.Context) -> Work:
         """Read everything the work needs into arrays and return the work. May raise `Refusal` or `MeshError`."""

@@ -68,7 +68,7 @@ def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     return scene.objects.get(obj.name) == obj or any(other == obj for other in scene.objects)
 
 
-def by_uid(among: Iterable[Any], uid: int) -> Any:
+def by_uid(among: Iterable[Any], uid: int | None) -> Any:
     """Return the datablock with Blender's number of this session, which undo and renaming leave alone, or None."""
     return next((block for block in among if block.session_uid == uid), None)
 

@@ -81,26 +81,16 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
 
 
 def every_way_to_redo(name: str, run: Any, weight: Any, reaches: Any) -> Wait:
-    """Run an operator and change the factor by which weights are mixed in, by all ways that Blender offers."""
+    """Run an operator and change the factor by which weights are mixed in, in the panel that Blender offers."""
     yield from run()
     whole = weight()
     yield from show_panel()
-    for factor in (0.5, 0.8):
+    for factor in (0.5, 0.8, 0.25):
         yield from set_factor(panel_rows(), factor)
         yield from quickly(reaches(factor * whole), f"{name}, redo panel")
     yield from picture(f"redo-{name}")
     over_the_viewport()
-    pointer("key", "F9")
-    yield 2.0
-    part = hand.region("WINDOW")
-    x, y = part.x + part.width // 3 + 200, screen_height() - part.y - 40
-    # from the middle, for the panel goes away when the mouse leaves it
-    yield from set_factor(
-        sorted(((x, y + hand.STEP * row) for row in range(-30, 11)), key=lambda at: abs(at[1] - y)), 0.25
-    )
-    yield from quickly(reaches(0.25 * whole), f"{name}, F9")
-    pointer("mousemove", part.x + 20, screen_height() - part.y - part.height // 2)  # away from it, which closes it
-    yield 1.0
+    yield 0.5
     # once more on what is there: a quarter of the way that is left
     pointer("key", "shift+r")
     yield from until(reaches((0.25 + 0.75 * 0.25) * whole))
