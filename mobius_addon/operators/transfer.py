@@ -82,10 +82,9 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: Any) -> None:
         """Write on every target, if they are still what was read."""
         objects = []
-        scene = by_uid(bpy.data.scenes, self._scene) or context.scene
         for uid, (name, surface) in zip(self.objects_read, self._targets, strict=True):
             obj = by_uid(bpy.data.objects, uid)
-            if obj is None or why_not(obj, "target mesh", scene) is not None:
+            if obj is None or why_not(obj, "target mesh", context.scene) is not None:
                 raise Refusal(f"'{name}' was removed or is being edited since the transfer began: transfer again")
             if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
                 raise Refusal(f"'{name}' was edited during the transfer: transfer again")
