@@ -62,12 +62,8 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     bpy.ops.ed.undo_push(message="selection")
 
     def conformal_transfer() -> Wait:
+        bpy.ops.mobius.conformal_transfer("INVOKE_DEFAULT", True)
         over_the_viewport()
-        pointer("key", "F3")
-        yield 1.0
-        pointer("type", "--delay", "40", "Transfer by Conformal")
-        yield 1.0
-        pointer("key", "Return")
         yield from until(lambda: jobs.Job.current is None and weight() > 0)
         yield 1.0
 
