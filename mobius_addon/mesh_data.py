@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,13 +41,6 @@ class Surface:
     corner_vertex: Integers
     corner_polygon: Integers
     edges: Integers
-
-    def fingerprint(self) -> str:
-        """Return a hash of vertices and triangles, which any edit of the shape changes."""
-        digest = hashlib.blake2b(digest_size=16)
-        digest.update(self.mesh.vertices.astype(np.float32).tobytes())
-        digest.update(self.mesh.faces.astype(np.int32).tobytes())
-        return digest.hexdigest()
 
 
 def foreach(collection: Any, name: str, width: int, dtype: type[np.generic]) -> np.ndarray:

@@ -12,6 +12,7 @@ from .access import (
     Layer,
     numbered,
 )
+from .active import ActiveLayers, note, persons_own
 from .carrier import Carrier
 from .masks import mask_names, mask_weights
 from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer, restored_on_failure, write_transfers
@@ -30,6 +31,7 @@ __all__ = [
     "ROWS",
     "SHARED_COLOR",
     "SHARED_LAYOUT",
+    "ActiveLayers",
     "AttributeAccess",
     "Carried",
     "Carrier",
@@ -45,7 +47,9 @@ __all__ = [
     "carrier_between",
     "mask_names",
     "mask_weights",
+    "note",
     "numbered",
+    "persons_own",
     "plan_transfer",
     "read_transfer",
     "restored_on_failure",

@@ -325,6 +325,9 @@ def restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
     except BaseException:
         failed = obj.data  # another mesh than before if one of these inside this one has put it back
         failed.user_remap(backup)
+        if failed.users:  # a mesh in Edit Mode is not exchanged, and to remove it would remove its objects
+            bpy.data.meshes.remove(backup)
+            raise
         bpy.data.meshes.remove(failed)
         backup.name = names[0]
         if backup.shape_keys:

@@ -176,7 +176,7 @@ def test_the_blend_holds_the_two_scans_and_what_was_carried(finished: Path, buil
     assert source.data.shape_keys.key_blocks[SMILE].value == 0
     kept = target.data.mobius_alignment
     assert kept.source == source
-    assert kept.target_fingerprint == read_surface(target).fingerprint()
+    assert kept.target_fingerprint == read_surface(target).mesh.fingerprint
 
 
 def test_pictures_leave_no_data_behind(built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,10 +45,10 @@ def test_a_mirrored_object_is_read_as_the_person_sees_it() -> None:
 
 def test_pose_and_size_do_not_matter_but_a_stretch_is_pointed_out() -> None:
     obj = make_sheet("Sheet", 4)
-    plain = read_surface(obj).fingerprint()
+    plain = read_surface(obj).mesh.fingerprint
     obj.location, obj.rotation_euler, obj.scale = (1, 2, 3), (0.1, 0.2, 0.3), (7, 7, 7)
     bpy.context.view_layer.update()
-    assert read_surface(obj).fingerprint() == plain
+    assert read_surface(obj).mesh.fingerprint == plain
     assert scale_warning(obj) is None
     obj.scale.z = 8
     bpy.context.view_layer.update()
@@ -57,15 +57,15 @@ def test_pose_and_size_do_not_matter_but_a_stretch_is_pointed_out() -> None:
 
 def test_the_fingerprint_tells_every_edit_of_the_shape() -> None:
     obj = make_sheet("Sheet", 4)
-    seen = {read_surface(obj).fingerprint()}
+    seen = {read_surface(obj).mesh.fingerprint}
     obj.data.vertices[3].co.z += 1e-4
-    seen.add(read_surface(obj).fingerprint())
+    seen.add(read_surface(obj).mesh.fingerprint)
     obj.data.flip_normals()
-    seen.add(read_surface(obj).fingerprint())
+    seen.add(read_surface(obj).mesh.fingerprint)
     assert len(seen) == 3
     obj.data.uv_layers.new(name="UV")
     obj.vertex_groups.new(name="Group")
-    seen.add(read_surface(obj).fingerprint())
+    seen.add(read_surface(obj).mesh.fingerprint)
     assert len(seen) == 3
 
 

@@ -188,11 +188,13 @@ def test_the_rival_can_be_taken(pair: tuple[Any, Any]) -> None:
 def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" in said
-    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7))
+    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7), waits=None)
     monkeypatch.setattr(jobs.Job, "current", under_way)
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" not in said
     assert {"Searching", "30.0 of at most 40.0, gap 10.0", "Stop"} <= set(said)
+    under_way.waits = "'Target' has to be in Object Mode"
+    assert {"Waiting", "'Target' has to be in Object Mode", "Stop"} <= set(drawn(panel.MOBIUS_PT_main))
     for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer):
         assert not operator.poll()
     with pytest.raises(RuntimeError, match="Align is under way: press ESC to stop it"):
