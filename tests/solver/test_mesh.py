@@ -31,6 +31,23 @@ def test_loose_vertices_have_no_normal_and_no_area():
     assert mesh.diagonal == pytest.approx(5)
 
 
+def test_the_fingerprint_is_of_positions_and_faces_alone():
+    vertices, faces = TRIANGLE
+    print_of = TriangleMesh(vertices, faces).fingerprint
+    # the number itself is kept, so that files written on one platform or by one version are known on another
+    assert print_of == "92c7a931286f33b24d825eb55a95c0bd"
+    assert TriangleMesh(np.array(vertices, ">f4"), np.array(faces, np.uint16), "other").fingerprint == print_of
+    assert TriangleMesh(np.asfortranarray(np.array(vertices) * -0.0 + vertices), faces).fingerprint == print_of
+    different = [
+        (vertices, [[1, 2, 0]]),
+        (vertices[1:] + vertices[:1], [[2, 0, 1]]),
+        ([*vertices, [9, 9, 9]], faces),
+        (vertices, [*faces, *faces]),
+        ([*vertices[:2], [0, np.nextafter(4, 5), 0]], faces),
+    ]
+    assert len({print_of, *(TriangleMesh(*arrays).fingerprint for arrays in different)}) == 6
+
+
 @pytest.mark.parametrize(
     ("vertices", "faces", "reason"),
     [
