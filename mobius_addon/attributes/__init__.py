@@ -14,7 +14,8 @@ from .access import (
 )
 from .carrier import Carrier
 from .masks import mask_names, mask_weights
-from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer, restored_on_failure, write_transfers
+from .plan import Carried, Transfer, restored_on_failure, write_transfers
+from .reading import Reading, plan_transfer, read_transfer
 from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
 from .unmatched import Unmatched, carrier_between, unmatched_vertices
