@@ -19,11 +19,11 @@ from scipy.spatial.transform import Rotation
 from ... import solver
 from .. import stored_alignment
 from ..attributes import Carrier, plan_transfer
-from ..command_line import DONE, say, say_error
-from ..files import Unreadable, new_scene, outputs, quiet
+from ..files import Unreadable, new_scene, outputs
 from ..mesh_data import Refusal, Surface, read_surface
 from ..operators.align import summary, write_alignment
 from ..operators.transfer import describe_counts
+from ..streams import DONE, quiet, say, say_error
 from .accuracy import best_rigid_error, transfer_error
 from .paint import FACE_PAINT, GRID_UV, paint_source
 from .pictures import Disc, Sitter, clay_material, hues, paint_material, render_discs, render_heads, require_cycles

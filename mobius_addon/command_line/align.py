@@ -1,0 +1,36 @@
+"""`align`: the certified correspondence between two meshes, as a map and a report."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..streams import DONE
+from .align_options import add_pair_options, align_settings
+from .output_files import require_writable, warn_of_order, write_report
+from .pair import align_pair, import_pair, read_pair
+
+HELP = "Find the certified correspondence between two meshes."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what `align` takes."""
+    add_pair_options(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Align two meshes, write what is asked for, and return the exit status."""
+    from ...solver import report, save_map
+    from ..files import new_scene, outputs
+
+    settings = align_settings(options)
+    require_writable(others=[options.map, options.report])
+    new_scene()
+    source, target = import_pair(options)
+    alignment, correspondence = align_pair(options, read_pair(options, source, target), settings)
+    with outputs() as written:
+        if options.map:
+            save_map(written.path(options.map), alignment, correspondence)
+        if options.report:
+            write_report(written.path(options.report), report(alignment, correspondence))
+    warn_of_order(options.map, (source, target))
+    return DONE

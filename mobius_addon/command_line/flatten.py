@@ -1,0 +1,79 @@
+"""`flatten`: a mesh with its map to the unit disc as UV map."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..streams import DONE, say, say_error
+from .mesh_options import MESH_HELP, OUTER_HELP, add_repair_options, require_outer
+from .output_files import require_writable, warn_of_losses, write_report
+
+HELP = "Write a mesh with its map to the unit disc as UV map."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what `flatten` takes."""
+    parser.add_argument("mesh", metavar="MESH", help=MESH_HELP)
+    parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="mesh file to write")
+    parser.add_argument("--report", metavar="REPORT.json", type=Path, help="write the distortion and what was repaired")
+    parser.add_argument(
+        "--method", choices=("harmonic", "mid-edge"), default="harmonic", help="how to flatten; default: %(default)s"
+    )
+    parser.add_argument(
+        "--distortion",
+        choices=("dilatation", "factor"),
+        help="write this as the color attribute 'Mobius Disc Angles' or 'Mobius Disc Sizes'",
+    )
+    repair = parser.add_argument_group("scans")
+    add_repair_options(repair)
+    repair.add_argument("--outer", type=int, metavar="VERTEX", help=OUTER_HELP)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Flatten a mesh, write it, and return the exit status."""
+    from dataclasses import asdict
+
+    from ..attributes import DISC_LAYOUT
+    from ..computation import Repair, flattened
+    from ..files import export_mesh, import_mesh, new_scene, outputs
+    from ..heat_maps import DISC_MEASURES, measure
+    from ..mesh_data import read_surface
+    from ..results import require_room, write_color, write_layout
+
+    require_writable(meshes=[options.output], others=[options.report])
+    new_scene()
+    obj = import_mesh(options.mesh).obj
+    surface = read_surface(obj, options.mesh)
+    shown = measure(options.distortion, DISC_MEASURES) if options.distortion else None
+    require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])
+    require_outer(options.outer, options, "--outer", surface)
+    repair = Repair(options.fill_holes, options.largest_part)
+    flattening, notes = flattened(surface.mesh, options.method, repair, outer=options.outer)
+    write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+    if shown:
+        write_color(obj, shown.attribute, *shown.color(flattening))
+    found = flattening.distortion
+    with outputs() as written:
+        export_mesh(obj, written.path(options.output))
+        if options.report:
+            figures = {
+                "mesh": options.mesh,
+                "method": options.method,
+                "distortion": asdict(found),
+                "flips_repaired": flattening.flips_repaired,
+                "holes": [len(loop) for loop in flattening.holes],
+                "warnings": list(notes),
+            }
+            write_report(written.path(options.report), figures)
+    for note in notes:
+        say_error(f"mobius: warning: {note}")
+    warn_of_losses(options.output, ["uv", "colors"] if shown else ["uv"])
+    say(
+        f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
+        f"(median {found.median_angle_error:.2f}°, 99 % {found.percentile_99_angle_error:.1f}°, "
+        f"most {found.max_angle_error:.1f}°), "
+        f"dilatation {found.mean_dilatation:.3f} (most {found.max_dilatation:.2f}), "
+        f"{found.flips} triangles turned over"
+    )
+    return DONE

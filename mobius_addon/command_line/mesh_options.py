@@ -1,0 +1,35 @@
+"""What commands are told about a mesh: its file, and how a scan is mended for the computation."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..mesh_data import Surface
+
+MESH_HELP = "any file Blender imports (.blend .obj .ply .stl .glb .gltf .fbx .usd); FILE:OBJECT names an object"
+OUTER_HELP = "number, from 0, of a vertex on the outer boundary, for --fill-holes; default: the longest boundary"
+
+
+def add_repair_options(group: argparse._ArgumentGroup) -> None:
+    """Add what mends a scan for the computation."""
+    group.add_argument(
+        "--fill-holes", action="store_true", help="close all boundaries but the outer one for the computation"
+    )
+    group.add_argument(
+        "--largest-part", action="store_true", help="leave all separate parts but the one of largest area out of it"
+    )
+
+
+def require_outer(vertex: int | None, options: argparse.Namespace, role: str, surface: Surface) -> None:
+    """Raise `Unreadable` if a vertex that was named for the outer boundary cannot be on one."""
+    from ..files import Unreadable
+
+    if vertex is None:
+        return
+    if not options.fill_holes:
+        raise Unreadable(f"{role} chooses among the boundaries that --fill-holes finds: give both")
+    count = len(surface.mesh.vertices)
+    if not 0 <= vertex < count:
+        raise Unreadable(f"{role} {vertex}: '{surface.mesh.name}' has the vertices 0 to {count - 1:,}")

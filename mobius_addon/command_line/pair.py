@@ -1,0 +1,74 @@
+"""Source and target of a command: imported, read as arrays, and aligned."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..streams import say, say_error
+from .mesh_options import require_outer
+
+if TYPE_CHECKING:
+    from ...solver import Alignment, AlignSettings, Correspondence, TriangleMesh
+    from ...solver.mesh import Integers
+    from ..files import Imported
+    from ..mesh_data import Surface
+
+
+def import_pair(options: argparse.Namespace) -> tuple[Imported, Imported]:
+    """Return source and target."""
+    from ..files import import_mesh
+    from ..mesh_data import Refusal
+
+    if _same_mesh(options.source, options.target):
+        raise Refusal(f"'{options.source}' is both source and target: give two meshes")
+    target = import_mesh(options.target)  # first, so that its materials and images keep their names
+    return import_mesh(options.source), target
+
+
+def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -> tuple[Surface, Surface]:
+    """Return source and target as arrays, named as on the command line."""
+    from ..mesh_data import read_surface
+
+    return read_surface(source.obj, options.source), read_surface(target.obj, options.target)
+
+
+def align_pair(
+    options: argparse.Namespace, surfaces: tuple[Surface, Surface], settings: AlignSettings
+) -> tuple[Alignment, Correspondence]:
+    """Align two surfaces and say what was found."""
+    from ..computation import aligned
+    from ..operators.align import summary
+
+    source, target = surfaces
+    require_outer(settings.source_outer, options, "--source-outer", source)
+    require_outer(settings.target_outer, options, "--target-outer", target)
+    pairs = _landmarks(options, (source.mesh, target.mesh))
+    alignment, correspondence = aligned(
+        source.mesh, target.mesh, settings, largest_part=options.largest_part, landmarks=pairs
+    )
+    for warning in alignment.warnings:
+        say_error(f"mobius: warning: {warning}")
+    say(summary(options.source, options.target, alignment, correspondence))
+    say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
+    return alignment, correspondence
+
+
+def _landmarks(options: argparse.Namespace, meshes: tuple[TriangleMesh, TriangleMesh]) -> Integers | None:
+    """Return the pairs of the file that was given, if any."""
+    from ..files import Unreadable
+    from ..landmarks import from_file
+
+    if options.landmarks is None:
+        return None
+    try:
+        return from_file(options.landmarks, meshes)
+    except OSError as error:
+        raise Unreadable(f"'{options.landmarks}' cannot be read: {error.strerror}") from error
+
+
+def _same_mesh(source: str, target: str) -> bool:
+    from ..files import split_object_name
+
+    (source_path, source_name), (target_path, target_name) = split_object_name(source), split_object_name(target)
+    return source_path.resolve() == target_path.resolve() and source_name == target_name

@@ -1,0 +1,132 @@
+"""`transfer`: what is on the source, carried to one target or to each of several."""
+
+from __future__ import annotations
+
+import argparse
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..streams import DONE, NOT_ALIGNED, say, say_error
+from .align_options import add_pair_options, align_settings
+from .output_files import require_writable, warn_of_losses, warn_of_order, write_report
+from .pair import align_pair, import_pair, read_pair
+from .several_targets import one_by_one
+from .transfer_options import add_transfer_options, transfer_settings
+
+if TYPE_CHECKING:
+    from ...solver import Correspondence
+    from ..attributes import Transfer
+    from ..mesh_data import Surface
+
+HELP = (
+    "Carry what is on the source over to the target, or to each of several. With several, -o, --map and --report "
+    "name folders, for a NAME.blend, NAME.npz and NAME.json of each target; one that cannot be done is named, the "
+    "others are done, and the exit status is 1."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what `transfer` takes."""
+    add_pair_options(parser, several_targets=True)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        type=Path,
+        required=True,
+        help="mesh file to write; for several targets a folder",
+    )
+    parser.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
+    add_transfer_options(parser.add_argument_group("transfer"))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Carry to each target and return the exit status: 1 if one of several could not be done."""
+    from ...solver import MeshError
+    from ..files import Unreadable
+    from ..mesh_data import Refusal
+
+    targets = options.target
+    if len(targets) == 1:
+        _transfer_to(argparse.Namespace(**{**vars(options), "target": targets[0]}))
+        return DONE
+    status = DONE
+    for one in one_by_one(options):
+        try:
+            _transfer_to(one)
+        except (Unreadable, MeshError, Refusal) as error:
+            say_error(f"mobius: {one.target}: {error}")
+            status = NOT_ALIGNED
+    return status
+
+
+def _transfer_to(options: argparse.Namespace) -> None:
+    """Carry what is on the source over to one target."""
+    from dataclasses import asdict
+
+    from ...solver import load_map, report, save_map
+    from ..files import Unreadable, export_mesh, new_scene, outputs
+    from ..operators.transfer import describe_counts, read_through
+
+    choices = transfer_settings(options)
+    settings = align_settings(options)
+    if options.use_map and (options.map or options.report):
+        raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    require_writable(meshes=[options.output], others=[options.map, options.report])
+    new_scene()
+    source, target = import_pair(options)
+    surfaces = read_pair(options, source, target)
+    alignment = None
+    if options.use_map:
+        correspondence = _fitting_map(load_map, options, surfaces)
+    else:
+        alignment, correspondence = align_pair(options, surfaces, settings)
+    plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
+    plan.write(target.obj)
+    with outputs() as written:
+        export_mesh(target.obj, written.path(options.output))
+        if alignment and options.map:
+            save_map(written.path(options.map), alignment, correspondence)
+        if alignment and options.report:
+            figures = report(alignment, correspondence) | {
+                "transferred": _listed(plan),
+                "unmatched": asdict(plan.unmatched),
+            }
+            write_report(written.path(options.report), figures)
+    for warning in plan.warnings:
+        say_error(f"mobius: warning: {warning}")
+    warn_of_losses(options.output, plan.counts())
+    warn_of_order(options.map, (source, target))
+    say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
+
+
+def _fitting_map(
+    load_map: Callable[[Path], Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
+) -> Correspondence:
+    """Load a map and make sure that it is one between these two meshes."""
+    import numpy as np
+
+    from ..files import Unreadable
+
+    path = options.use_map
+    if not path.is_file():
+        raise Unreadable(f"there is no file '{path}'")
+    try:
+        correspondence = load_map(path)
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise Unreadable(f"'{path}' is not a map that this program wrote") from error
+    source, target = surfaces
+    if not np.array_equal(correspondence.source_triangles, source.mesh.faces):
+        raise Unreadable(f"'{path}' was made for another source than '{options.source}'")
+    if len(correspondence.face) != len(target.mesh.vertices):
+        raise Unreadable(
+            f"'{path}' was made for a target of {len(correspondence.face):,} vertices, "
+            f"but '{options.target}' has {len(target.mesh.vertices):,}"
+        )
+    return correspondence
+
+
+def _listed(plan: Transfer) -> list[dict[str, str]]:
+    return [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]

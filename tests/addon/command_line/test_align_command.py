@@ -1,0 +1,42 @@
+"""`align`: its map, its report and what it says."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import QUICK, listing, run
+
+
+def test_align_writes_map_and_report(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    map_file, report_file = scans / "map.npz", scans / "report.json"
+    arguments = ["--map", map_file, "--report", report_file, *QUICK]
+    status, out, err = run(capsys, "align", scans / "source.obj", scans / "target.obj", *arguments)
+    assert (status, err) == (0, "")
+    assert "certified: no Möbius map with |z| <= 0.83 matches more" in out
+    report = json.loads(report_file.read_text())
+    assert report["certified"] is True
+    assert report["upper_bound"] == pytest.approx(report["value"])
+    assert set(report["distortion"]) == {"source", "target"}
+    with np.load(map_file) as stored:
+        arrays = dict(stored)
+    assert arrays["face"].shape == (256,)
+    assert arrays["barycentric"].shape == (256, 3)
+    assert arrays["source_disc"].shape == (441,)
+    assert arrays["target_disc"].dtype == np.complex128
+    # the triangles index the file's own vertices: read them without Blender and compare the places
+    lines = (scans / "source.obj").read_text().splitlines()
+    vertices = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
+    there = np.einsum("qk,qkd->qd", arrays["barycentric"], vertices[arrays["source_triangles"][arrays["face"]]])
+    lines = (scans / "target.obj").read_text().splitlines()
+    own = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
+    assert np.median(np.linalg.norm(there - own, axis=1)) < 0.05
+
+
+def test_align_without_outputs_says_what_it_found(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = listing(scans)
+    status, out, _ = run(capsys, "align", scans / "source.obj", scans / "target.obj", *QUICK)
+    assert status == 0
+    assert "matched value" in out
+    assert "search " in out  # the time of each stage
+    assert listing(scans) == before
