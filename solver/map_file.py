@@ -141,8 +141,12 @@ def _require_fitting(
             raise _UnfitError(
                 f"'{path}' does not say which meshes it was made for, as those of earlier versions: align them again"
             )
-        count = len(mesh.faces if role == "source" else mesh.vertices)
-        if lengths[length] != count or _fingerprint(archive, role) != mesh.fingerprint:
+        what, count = ("faces", len(mesh.faces)) if role == "source" else ("vertices", len(mesh.vertices))
+        if lengths[length] != count:
+            raise _UnfitError(
+                f"'{path}' was made for a {role} of {lengths[length]:,} {what}, but '{mesh.name}' has {count:,}"
+            )
+        if _fingerprint(archive, role) != mesh.fingerprint:
             raise _UnfitError(
                 f"'{path}' was made for another {role} than '{mesh.name}', or for this one before its vertices or "
                 "faces were moved or put in another order: align again"

@@ -16,6 +16,7 @@ from .carrier import Carrier
 from .masks import mask_names, mask_weights
 from .plan import Carried, Transfer, restored_on_failure, write_transfers
 from .reading import Reading, plan_transfer, read_transfer
+from .record import forget_written
 from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
 from .unmatched import Unmatched, carrier_between, unmatched_vertices
@@ -44,6 +45,7 @@ __all__ = [
     "Unmatched",
     "VertexGroupAccess",
     "carrier_between",
+    "forget_written",
     "mask_names",
     "mask_weights",
     "numbered",

@@ -60,6 +60,12 @@ def remember(obj: bpy.types.Object, kept: Iterable[Written], written: Iterable[t
     obj.data[PROPERTY] = json.dumps(entries)
 
 
+def forget_written(mesh: bpy.types.Mesh) -> None:
+    """Take what is kept about written layers off a mesh: they count as the person's own from then on."""
+    if PROPERTY in mesh:
+        del mesh[PROPERTY]
+
+
 def fingerprint(values: Values) -> str:
     """Return a hash of values, (n, ...)."""
     digest = blake2b(repr(values.shape).encode(), digest_size=16)
