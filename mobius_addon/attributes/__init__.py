@@ -15,6 +15,7 @@ from .access import (
 from .carrier import Carrier
 from .masks import mask_names, mask_weights
 from .plan import Carried, Transfer, restored_on_failure, write_transfers
+from .preview import Preview, preview
 from .reading import Reading, plan_transfer, read_transfer
 from .record import forget_written
 from .settings import Mask, TransferSettings, split_names
@@ -38,6 +39,7 @@ __all__ = [
     "Kind",
     "Layer",
     "Mask",
+    "Preview",
     "Reading",
     "Row",
     "Transfer",
@@ -50,6 +52,7 @@ __all__ = [
     "mask_weights",
     "numbered",
     "plan_transfer",
+    "preview",
     "read_transfer",
     "restored_on_failure",
     "split_names",

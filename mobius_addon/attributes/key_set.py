@@ -88,11 +88,8 @@ class KeyPlan:
         keys.use_relative = self.relative
 
     def finish(self, obj: bpy.types.Object) -> None:
-        """Do what needs all keys to be there: circles of relative keys, time, drivers and keyframes."""
+        """Do what needs all keys to be there: time, drivers and keyframes."""
         keys: Any = obj.data.shape_keys
-        for name, slider in self.sliders.items():
-            if slider.anchored and slider.relative in keys.key_blocks:
-                keys.key_blocks[name].relative_key = keys.key_blocks[slider.relative]
         if self.in_time:
             keys.eval_time = self.source.eval_time
         source = bpy.data.objects.get(self.source.owner)

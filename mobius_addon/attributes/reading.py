@@ -22,7 +22,7 @@ from .placing import Place, holds_nothing, is_same, joins, kept_notes, replaced_
 from .plan import Carried, Transfer
 from .record import Written, unedited
 from .settings import TransferSettings
-from .shape_keys import limited
+from .shape_keys import ShapeKeyAccess, limited
 from .table import KINDS, ROWS, Row
 from .unmatched import Unmatched
 from .vertex_groups import read_weights
@@ -221,7 +221,10 @@ def read_transfer(
             if name != layer.name and not row.marks:
                 warnings.append(f"'{target.name}' has something else named '{layer.name}': it becomes '{name}'")
             found.append((layer, name))
-        there = row.access.existing(target, [name for _, name in found])
+        names = [name for _, name in found]
+        there = row.access.existing(target, names)
+        if isinstance(row.access, ShapeKeyAccess) and joins(row, settings):
+            there = row.access.shown(target, names)
         for layer, name in found:
             place = _place(row, target, layer.name, name, there.get(name), earlier, reserved)
             reserved |= {x for x in (place.before, place.beside) if x is not None}

@@ -25,9 +25,7 @@ class Slider:
     value, slider_min, slider_max, mute, interpolation
         As in `bpy.types.ShapeKey`.
     relative : str
-        The key that it moves; "" stands for the first one.
-    anchored : bool
-        The shape is measured from the first key: following `relative` leads back to this key.
+        The key that it moves; "" stands for the first one. A key that moves itself shows nothing.
     vertex_group : str
         The group that limits the key, "" if there is none.
     limit : (n,) float32 or None
@@ -42,20 +40,13 @@ class Slider:
     mute: bool
     interpolation: str
     relative: str
-    anchored: bool
     vertex_group: str
     limit: Values | None
     frame: float | None
 
     def renamed(self, keys: Mapping[str, str], groups: Mapping[str, str]) -> Slider:
         """Return the slider with the names that keys and groups, by their names on the source, have on the target."""
-        relative = keys.get(self.relative, "")
-        return replace(
-            self,
-            relative=relative,
-            anchored=self.anchored and bool(relative),
-            vertex_group=groups.get(self.vertex_group, ""),
-        )
+        return replace(self, relative=keys.get(self.relative, ""), vertex_group=groups.get(self.vertex_group, ""))
 
 
 def limited(layer: Layer) -> Layer:
@@ -88,28 +79,25 @@ class ShapeKeyAccess:
         basis = keys.reference_key
         groups = sorted({key.vertex_group for key in keys.key_blocks} & set(obj.vertex_groups.keys()))
         weights = dict(zip(groups, read_weights(obj, groups).T, strict=True)) if keys.use_relative else {}
-        waiting, told = [key for key in keys.key_blocks if key != basis], {basis.name}
+        waiting, told = [key for key in keys.key_blocks if key != basis], set()
         while waiting:
-            # keys that are relative to each other have no order: as they stand
-            key = next((key for key in waiting if key.relative_key.name in told), waiting[0])
+            moved = [key.relative_key for key in waiting]
+            ready = (key for key, it in zip(waiting, moved, strict=True) if it not in waiting or it == key)
+            key = next(ready, waiting[0])
             waiting.remove(key)
-            moved, anchored = key.relative_key, key.relative_key.name not in told
-            told.add(key.name)
             if not chosen(key.name):
                 continue
-            if not keys.use_relative:
-                yield Layer(key.name, mirrored(obj, _shape(key) - _shape(basis)), _slider(key, keys))
-                continue
-            relative = moved.name if moved != basis and chosen(moved.name) else ""
-            anchored = anchored and bool(relative)
-            about = replace(
-                _slider(key, keys),
-                relative=relative,
-                anchored=anchored,
-                vertex_group=key.vertex_group if key.vertex_group in weights else "",
-                limit=weights.get(key.vertex_group),
-            )
-            yield Layer(key.name, mirrored(obj, _shape(key) - _shape(basis if anchored else moved)), about)
+            told.add(key.name)
+            about = _slider(key, keys)
+            if keys.use_relative:
+                # of keys that are relative to each other in a circle, one moves the first key by as much
+                about = replace(
+                    about,
+                    relative=key.relative_key.name if key.relative_key.name in told else "",
+                    vertex_group=key.vertex_group if key.vertex_group in weights else "",
+                    limit=weights.get(key.vertex_group),
+                )
+            yield Layer(key.name, mirrored(obj, _displacement(key, keys)), about)
 
     def place(self, obj: bpy.types.Object, name: str, reserved: Set[str], *, number: bool = False) -> str | None:
         """Return `name`, another one if the target's first key bears it, or None if a locked key does.
@@ -124,19 +112,15 @@ class ShapeKeyAccess:
         return next(x for x in numbered(name) if x not in there and x not in reserved)
 
     def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
-        """Return the displacements of those of the keys that are there, as far as the groups that limit them let."""
+        """Return the displacements of those of the keys that are there, whatever limits them."""
         keys = obj.data.shape_keys
-        if keys is None:
-            return {}
-        there = [keys.key_blocks[name] for name in names if name in keys.key_blocks]
-        groups = sorted({key.vertex_group for key in there} & set(obj.vertex_groups.keys()))
-        weights = dict(zip(groups, read_weights(obj, groups).T, strict=True)) if keys.use_relative else {}
-        found = {}
-        for key in there:
-            moved = mirrored(obj, _displacement(key, keys))
-            limit = weights.get(key.vertex_group)
-            found[key.name] = moved if limit is None else moved * limit[:, None]
-        return found
+        there = () if keys is None else (keys.key_blocks[name] for name in names if name in keys.key_blocks)
+        return {key.name: mirrored(obj, _displacement(key, _keys(obj))) for key in there}
+
+    def shown(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
+        """Return the displacements of those of the keys that are there, as far as the groups that limit them let."""
+        found = self.existing(obj, names)
+        return {name: _limit(obj, _keys(obj).key_blocks[name], moved) for name, moved in found.items()}
 
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
         """Create the key or replace its shape and slider; a new one does not move vertices that are not covered.
@@ -152,11 +136,13 @@ class ShapeKeyAccess:
             obj.shape_key_remove(key)  # the only way to another frame
             key = None
         before = None if key is None else _displacement(key, keys)
+        if key is not None and before is not None and key.vertex_group != about.vertex_group:
+            before = _limit(obj, key, before)
         key = _new_key(obj, name, about.frame) if key is None else key
         basis = keys.reference_key
-        moved = basis if about.anchored else keys.key_blocks.get(about.relative) or basis
+        moved = keys.key_blocks.get(about.relative) or basis
         old = _shape(key)
-        shape = _shape(moved)
+        shape = _shape(basis if moved == key else moved)
         if before is not None:
             shape += np.where(covered[:, None], 0, before)
         shape[covered] += mirrored(obj, values)[covered]
@@ -183,8 +169,16 @@ def _shape(key: bpy.types.ShapeKey) -> Floats:
 
 
 def _displacement(key: bpy.types.ShapeKey, keys: bpy.types.Key) -> Floats:
-    """Return how far a key moves the one that it is relative to, (n, 3)."""
-    return _shape(key) - _shape(key.relative_key if keys.use_relative else keys.reference_key)
+    """Return how far a key moves the one that it is relative to, (n, 3), or the first one if that is itself."""
+    moved = key.relative_key if keys.use_relative and key.relative_key != key else keys.reference_key
+    return _shape(key) - _shape(moved)
+
+
+def _limit(obj: bpy.types.Object, key: bpy.types.ShapeKey, moved: Floats) -> Floats:
+    """Return what the group that limits a relative key lets through of its displacement."""
+    if not _keys(obj).use_relative or key.vertex_group not in obj.vertex_groups:
+        return moved
+    return moved * read_weights(obj, [key.vertex_group])
 
 
 def _new_key(obj: bpy.types.Object, name: str, frame: float | None) -> bpy.types.ShapeKey:
@@ -222,7 +216,6 @@ def _slider(key: bpy.types.ShapeKey, keys: bpy.types.Key) -> Slider:
         mute=key.mute,
         interpolation=key.interpolation,
         relative="",
-        anchored=False,
         vertex_group="",
         limit=None,
         frame=None if keys.use_relative else key.frame,
