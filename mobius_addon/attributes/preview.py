@@ -8,7 +8,7 @@ import bpy
 
 from ..mesh_data import Refusal
 from .chosen import chosen_layers
-from .placing import joins
+from .placing import holds_nothing, joins
 from .record import written_on
 from .settings import TransferSettings
 from .table import KINDS, ROWS
@@ -52,6 +52,8 @@ def preview(source: bpy.types.Object, target: bpy.types.Object, settings: Transf
         except Refusal:  # said when it is carried
             continue
         there = {name for name in row.access.names(target) if (row.kind, name) not in earlier}
+        if row.marks:  # most meshes have them, and nothing in them
+            there = {name for name, x in row.access.existing(target, list(there)).items() if not holds_nothing(row, x)}
         if not there:
             continue
         given = [name for name in row.access.names(source) if row.once or chosen(name)]

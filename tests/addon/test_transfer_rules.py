@@ -48,7 +48,7 @@ def add_group(obj: Any, name: str, values: Any) -> None:
 
 def add_color(obj: Any, name: str, color: Any) -> None:
     layer = obj.data.color_attributes.new(name, "FLOAT_COLOR", "POINT")
-    layer.data.foreach_set("color", np.broadcast_to(color, (N * N, 4)).astype(np.float32).ravel())
+    layer.data.foreach_set("color", np.broadcast_to(color, (len(layer.data), 4)).astype(np.float32).ravel())
 
 
 def color(obj: Any, name: str) -> np.ndarray:
