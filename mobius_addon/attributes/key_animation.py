@@ -119,7 +119,10 @@ def _same_curves(first: bpy.types.ID, second: bpy.types.ID) -> bool:
 
 
 def _bag(keys: Any) -> Any:
-    """Return the curves that move a target's keys, to add to: of an action that nothing else uses."""
+    """Return the curves that move a target's keys, to add to: of an action that nothing else uses.
+
+    Another one uses it while `restored_on_failure` keeps a copy of the mesh.
+    """
     animated = keys.animation_data_create()
     action = animated.action
     if action is None:

@@ -126,14 +126,30 @@ def restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
     keys = mesh.shape_keys
     names = mesh.name, keys.name if keys else ""
     backup = mesh.copy()  # layers are shared until they are written: this costs next to nothing
+    action = _key_action(mesh)
     try:
         yield
     except BaseException:
         failed = obj.data  # another mesh than before if one of these inside this one has put it back
+        made = _key_action(failed)
         failed.user_remap(backup)
         bpy.data.meshes.remove(failed)
+        if made is not None and made != action and not made.users:
+            bpy.data.actions.remove(made)
         backup.name = names[0]
         if backup.shape_keys:
             backup.shape_keys.name = names[1]
         raise
     bpy.data.meshes.remove(backup)
+    made = _key_action(mesh)
+    if action is not None and made is not None and made != action and action.users == int(action.use_fake_user):
+        # keyframes were added to a copy of the action, which takes its place
+        name, made.use_fake_user = action.name, action.use_fake_user
+        bpy.data.actions.remove(action)
+        made.name = name
+
+
+def _key_action(mesh: bpy.types.Mesh) -> bpy.types.Action | None:
+    """Return the action that moves the sliders of a mesh."""
+    keys = mesh.shape_keys
+    return keys.animation_data.action if keys is not None and keys.animation_data is not None else None

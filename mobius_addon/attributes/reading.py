@@ -18,6 +18,7 @@ from .key_animation import left_behind
 from .key_set import KeyPlan, KeySet, key_set, planned
 from .looks import Looks, looks_of
 from .missing import carried_without_missing, missing_warning
+from .mixing import changes, mixed, over
 from .placing import Place, holds_nothing, is_same, joins, kept_notes, replaced_notes
 from .plan import Carried, Transfer
 from .record import Written, unedited
@@ -77,7 +78,7 @@ class Reading:
             carried, missing = self._carried(pending)
             if row.marks:
                 # flags that most meshes have: no word about those that stay as they are
-                if not _changes(carried, pending.place.there):
+                if not changes(carried, pending.place.there):
                     continue
                 if carried.name != name:
                     warnings.append(f"'{self.names[1]}' has an attribute of another type named '{name}': delete it")
@@ -107,7 +108,7 @@ class Reading:
             share = self.carrier.at(row.access.domain, self.influence)
         if row.mixes:
             covered = covered & (share > 0)
-            values = _mixed(values, place.there, settings.mix, settings.mix_factor * share)
+            values = mixed(values, place.there, settings.mix, settings.mix_factor * share)
         else:
             covered = covered & (share >= 0.5)
         return Carried(row, layer.name, place.name, values, covered, layer.about), missing
@@ -117,8 +118,8 @@ class Reading:
         if not groups:
             return layers
         columns = tidied(
-            np.clip(np.stack([x.values for x in groups], axis=1), 0, 1),
-            groups[0].covered,
+            np.clip(np.stack([np.where(x.covered, x.values, 0) for x in groups], axis=1), 0, 1),
+            np.any([x.covered for x in groups], axis=0),
             smallest=self.settings.smallest_weight,
             limit=self.settings.limit,
             normalize=self.settings.normalize,
@@ -142,7 +143,7 @@ class Reading:
             if name != place.name:
                 kept.append((row.kind, place.name, name))
                 assert there is not None
-                carried = _over(carried, there)
+                carried = over(carried, there)
             own = same and not place.earlier and not holds_nothing(row, there)
             result.append(replace(carried, name=name, own=own))
         return result, [*kept_notes(self.names[1], kept), *replaced_notes(self.names[1], lost)]
@@ -289,30 +290,6 @@ def _place(
     before = [x.name for x in ours if x.source_name == source_name and x.name not in reserved]
     beside = row.access.place(target, source_name, reserved, number=True)
     return Place(name, there, False, next(iter(before), None), beside)
-
-
-def _over(carried: Carried, there: Values) -> Carried:
-    """Return a layer that has, where nothing is carried, the values of the one that it will stand beside."""
-    values = np.where(carried.covered.reshape(-1, *[1] * (there.ndim - 1)), carried.values, there)
-    return replace(carried, values=values, covered=np.ones(len(values), bool))
-
-
-def _mixed(values: Values, there: Values | None, mix: str, share: Floats) -> Values:
-    """Return what is there and the carried values joined, going the share, (n,), of the way; missing ones are 0."""
-    if mix == "replace" and (share == 1).all():
-        return values
-    old = np.zeros(values.shape) if there is None else np.nan_to_num(there.astype(np.float64), posinf=0, neginf=0)
-    joined = {"replace": values, "add": old + values, "subtract": old - values, "multiply": old * values}[mix]
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.where(share == 1, joined, old + share * (joined - old))
-
-
-def _changes(carried: Carried, there: Values | None) -> bool:
-    """Return whether writing a layer would change what is there; what is missing counts as zeros."""
-    new = carried.values[carried.covered]
-    if there is None:
-        return bool(new.any())
-    return bool((new.astype(there.dtype) != there[carried.covered]).any())
 
 
 def _nothing(source: str, settings: TransferSettings, warnings: Iterable[str]) -> str:

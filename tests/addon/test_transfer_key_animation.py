@@ -12,6 +12,7 @@ from test_transfer_shape_keys import add_key
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
+from mobius_extension.mobius_addon.attributes import plan  # noqa: E402
 from mobius_extension.mobius_addon.attributes.key_animation import curves_of  # noqa: E402
 
 
@@ -91,8 +92,8 @@ def test_a_driver_by_a_transform_of_the_source_follows_the_target_and_one_by_ano
     rig = make_object("Rig", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
     drive(source, "Smile", source, "", "TRANSFORMS")
     drive(source, "Corrective", rig, "", "TRANSFORMS")
-    plan = carry(source, target, "shape-keys")
-    assert plan.warnings == ()
+    done = carry(source, target, "shape-keys")
+    assert done.warnings == ()
     source.location.x, target.location.x, rig.location.x = 0.25, 0.5, 0.75
     assert value(target, "Smile") == pytest.approx(0.5)
     assert value(target, "Corrective") == pytest.approx(0.75)
@@ -103,14 +104,14 @@ def test_what_the_target_does_not_have_is_followed_on_the_source_and_said(two: A
     source["control"] = 0.5
     drive(source, "Smile", source, '["control"]')
     drive(source, "Corrective", source.data.shape_keys, 'key_blocks["Smile"].value')
-    plan = carry(source, target, "shape-keys", layers="named", names=("Corrective",))
-    assert plan.warnings == (
+    done = carry(source, target, "shape-keys", layers="named", names=("Corrective",))
+    assert done.warnings == (
         "the driver of 'Corrective' follows key_blocks[\"Smile\"].value of 'Source', which 'Target' does not have: "
         "it still follows 'Source'",
     )
     assert end_of(target, "Corrective").id == source.data.shape_keys
-    plan = carry(source, target, "shape-keys")
-    assert plan.warnings == (
+    done = carry(source, target, "shape-keys")
+    assert done.warnings == (
         "the driver of 'Smile' follows [\"control\"] of 'Source', which 'Target' does not have: "
         "it still follows 'Source'",
     )
@@ -127,8 +128,8 @@ def test_an_expression_that_names_the_source_is_pointed_out(two: Any) -> None:
     variable = drive(source, "Smile", source, "", "TRANSFORMS")
     driver = source.data.shape_keys.animation_data.drivers[0].driver
     driver.expression = f'{variable.name} + bpy.data.objects["Source"].location.y'
-    plan = carry(source, target, "shape-keys")
-    assert plan.warnings == ("the driver of 'Smile' names 'Source' in its expression: change it on 'Target'",)
+    done = carry(source, target, "shape-keys")
+    assert done.warnings == ("the driver of 'Smile' names 'Source' in its expression: change it on 'Target'",)
 
 
 def test_ranges_and_other_properties_of_a_key_keep_their_drivers(two: Any) -> None:
@@ -238,6 +239,39 @@ def test_only_what_is_carried_is_animated_and_what_another_mesh_uses_stays() -> 
     assert target.data.shape_keys.key_blocks["Smile"].value == pytest.approx(1)
 
 
+def actions() -> list[tuple[str, int, bool]]:
+    return sorted((x.name, x.users, x.use_fake_user) for x in bpy.data.actions)
+
+
+@pytest.mark.parametrize("fake", [False, True])
+def test_keyframes_join_the_target_s_own_action_which_a_failure_leaves_as_it_was(
+    fake: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = sheets()
+    for obj, name in ((source, "Smile"), (target, "Own")):
+        key(obj, name, 1)
+        animate(obj, name, {1: 0, 10: 1})
+    own = target.data.shape_keys.animation_data.action
+    own.name, own.use_fake_user = "Talking", fake
+    before = actions()
+    remember = plan.remember
+
+    def fails(*_: Any) -> None:
+        raise MemoryError("no memory")
+
+    monkeypatch.setattr(plan, "remember", fails)
+    with pytest.raises(MemoryError):
+        carry(source, target, "shape-keys")
+    assert actions() == before
+    assert [x.data_path for x in curves_of(target.data.shape_keys)] == ['key_blocks["Own"].value']
+    monkeypatch.setattr(plan, "remember", remember)
+    for _ in range(2):
+        carry(source, target, "shape-keys")
+        assert actions() == before
+        assert target.data.shape_keys.animation_data.action.name == "Talking"
+        assert len(curves_of(target.data.shape_keys)) == 2
+
+
 def test_the_value_follows_its_keyframes_under_another_name() -> None:
     source, target = sheets()
     key(source, 'A "B"', 1)
@@ -263,8 +297,8 @@ def test_strips_of_the_nonlinear_animation_are_said() -> None:
     strip = animated.nla_tracks.new().strips.new("Talk", 1, action)
     if slot is not None:
         strip.action_slot = slot
-    plan = carry(source, target, "shape-keys")
-    assert plan.warnings == (
+    done = carry(source, target, "shape-keys")
+    assert done.warnings == (
         "strips of the nonlinear animation of 'Source' move 'Smile': they are not carried, only the values that they "
         "have now",
     )
