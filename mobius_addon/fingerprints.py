@@ -23,7 +23,7 @@ def fingerprint_of(obj: bpy.types.Object) -> str | None:
     key = mesh.session_uid, len(mesh.vertices), len(mesh.loops), len(mesh.polygons), is_mirrored(obj)
     if key not in _known:
         try:
-            _known[key] = read_surface(obj).mesh.fingerprint
+            _known[key] = read_surface(obj).rest.fingerprint
         except MeshError:
             _known[key] = None
     return _known[key]

@@ -34,6 +34,7 @@ from .options import (
 )
 from .preferences import preferences
 from .preset_menus import MOBIUS_PT_align_presets, MOBIUS_PT_transfer_presets
+from .transfer_preview import draw_preview
 from .usable import why_not
 
 
@@ -161,6 +162,7 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
             row = column.row()
             row.alignment = "LEFT"
             row.prop_enum(settings, "kinds", identifier, icon=icon)
+        draw_preview(layout, context)
         column = layout.column()
         column.scale_y = 1.4
         _hand_on(TRANSFER_OPTIONS, settings, column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER"))

@@ -47,7 +47,7 @@ def store(
     kept = target.data.mobius_alignment
     kept.property_unset("source")  # of an earlier version
     kept.source_name, kept.source_size = source.name, len(surfaces[0].mesh.vertices)
-    kept.source_fingerprint, kept.target_fingerprint = (surface.mesh.fingerprint for surface in surfaces)
+    kept.source_fingerprint, kept.target_fingerprint = (surface.rest.fingerprint for surface in surfaces)
     kept.value = alignment.value
     kept.upper_bound = alignment.search.upper_bound
     kept.certified = alignment.certified
@@ -104,7 +104,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
         (source, source_surface, kept.source_fingerprint),
         (target, target_surface, kept.target_fingerprint),
     ):
-        if surface.mesh.fingerprint != fingerprint and earlier_version.fingerprint(surface.mesh) != fingerprint:
+        if surface.rest.fingerprint != fingerprint and earlier_version.fingerprint(surface.rest) != fingerprint:
             raise Refusal(rpt_("'{}' has been edited since it was aligned: press Align again").format(obj.name))
     arrays = _unpack(kept.packed, target.name)
     return Correspondence(

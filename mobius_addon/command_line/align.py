@@ -26,10 +26,11 @@ def run(options: argparse.Namespace) -> int:
     require_writable(others=[options.map, options.report])
     new_scene()
     source, target = import_pair(options)
-    alignment, correspondence = align_pair(options, read_pair(options, source, target), settings)
+    surfaces = read_pair(options, source, target)
+    alignment, correspondence = align_pair(options, surfaces, settings)
     with outputs() as written:
         if options.map:
-            save_map(written.path(options.map), alignment, correspondence)
+            save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
         if options.report:
             write_report(written.path(options.report), report(alignment, correspondence))
     warn_of_order(options.map, (source, target))

@@ -27,9 +27,12 @@ def import_pair(options: argparse.Namespace) -> tuple[Imported, Imported]:
 
 
 def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -> tuple[Surface, Surface]:
-    """Return source and target as arrays, named as on the command line."""
-    from ..mesh_data import read_surface
+    """Return source and target as arrays, named as on the command line, and say where they look otherwise."""
+    from ..mesh_data import read_surface, unseen_warning
 
+    for imported in (source, target):
+        if warning := unseen_warning(imported.obj):
+            say_error(f"mobius: warning: {warning}")
     return read_surface(source.obj, options.source), read_surface(target.obj, options.target)
 
 

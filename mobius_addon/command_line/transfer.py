@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,6 +66,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from ...solver import load_map, report, save_map
+    from ..attributes import forget_written
     from ..files import Unreadable, export_mesh, new_scene, outputs
     from ..operators.transfer import describe_counts, read_through
 
@@ -85,10 +85,12 @@ def _transfer_to(options: argparse.Namespace) -> None:
         alignment, correspondence = align_pair(options, surfaces, settings)
     plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
     plan.write(target.obj)
+    if options.output.suffix.lower() != ".blend":  # others carry it as a property that is of no use there
+        forget_written(target.obj.data)
     with outputs() as written:
         export_mesh(target.obj, written.path(options.output))
         if alignment and options.map:
-            save_map(written.path(options.map), alignment, correspondence)
+            save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
         if alignment and options.report:
             figures = report(alignment, correspondence) | {
                 "transferred": _listed(plan),
@@ -103,29 +105,20 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
 
 def _fitting_map(
-    load_map: Callable[[Path], Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
+    load_map: Callable[..., Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
 ) -> Correspondence:
     """Load a map and make sure that it is one between these two meshes."""
-    import numpy as np
-
     from ..files import Unreadable
 
     path = options.use_map
     if not path.is_file():
         raise Unreadable(f"there is no file '{path}'")
     try:
-        correspondence = load_map(path)
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise Unreadable(f"'{path}' is not a map that this program wrote") from error
-    source, target = surfaces
-    if not np.array_equal(correspondence.source_triangles, source.mesh.faces):
-        raise Unreadable(f"'{path}' was made for another source than '{options.source}'")
-    if len(correspondence.face) != len(target.mesh.vertices):
-        raise Unreadable(
-            f"'{path}' was made for a target of {len(correspondence.face):,} vertices, "
-            f"but '{options.target}' has {len(target.mesh.vertices):,}"
-        )
-    return correspondence
+        return load_map(path, *(surface.rest for surface in surfaces))
+    except OSError as error:
+        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
 
 
 def _listed(plan: Transfer) -> list[dict[str, str]]:

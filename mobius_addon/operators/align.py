@@ -15,7 +15,7 @@ from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
-from ..mesh_data import Refusal, Surface, read_surface, scale_warning
+from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..usable import by_uid, why_not_pair
@@ -108,7 +108,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
 
     def announce(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
         """Report an alignment."""
-        for warning in [scale_warning(source), scale_warning(target), *done.alignment.warnings]:
+        for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, warning)
         self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))

@@ -11,7 +11,7 @@ from ...solver import MeshError
 from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
-from ..mesh_data import Refusal, foreach, read_surface
+from ..mesh_data import Refusal, read_surface, seen_positions
 from ..results import pattern_color, read_layout, require_room, write_color
 from ..usable import why_not_aligned
 
@@ -153,7 +153,7 @@ def _beside(first: Floats, second: Floats) -> float:
 def _world(obj: bpy.types.Object) -> Floats:
     """Return the vertices of an object in the world, (n, 3)."""
     matrix = np.array(obj.matrix_world)
-    return foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    return seen_positions(obj) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy.types.Object:
@@ -165,5 +165,6 @@ def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy
         context.scene.collection.children.link(collection)
     copy = bpy.data.objects.new(f"{obj.name} (side by side)", obj.data)
     copy.matrix_world = matrix
+    copy.show_only_shape_key, copy.active_shape_key_index = obj.show_only_shape_key, obj.active_shape_key_index
     collection.objects.link(copy)
     return copy

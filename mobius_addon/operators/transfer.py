@@ -148,8 +148,8 @@ def _read(
         carrier, unmatched = between(correspondence, own_surface, source)
         return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
     carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
-    # shape keys are the original's own, which has other vertices then
-    own = None if shown.origin is None else between(correspondence, own_surface, source)[0]
+    # shape keys are the original's own, in its own shape
+    own = between(correspondence, own_surface, source)[0]
     return read_transfer(
         source,
         target,

@@ -276,3 +276,30 @@ def test_german_covers_the_interface() -> None:
     for english, german in GERMAN.items():
         assert fields(english) == fields(german), english
         assert english.endswith(":") == german.endswith(":"), english
+
+
+# before a transfer
+
+
+def test_what_is_kept_and_replaced_is_said_above_the_button(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+    for obj in pair:
+        obj.data.materials.append(bpy.data.materials.new("Skin"))
+        for name in ("Head", "Jaw", "Eye", "Nose", "Chin"):
+            obj.vertex_groups.new(name=name).add((1, 2), 0.5, "REPLACE")
+    target.data.uv_layers.new(name="UVMap")
+    lines = drawn(panel.MOBIUS_PT_transfer)
+    assert "Stays on the target: Head, Jaw, Eye, Nose, ..." in lines
+    assert "Replaced on the target: Materials" in lines
+    assert lines.index("Replaced on the target: Materials") < lines.index("Transfer")
+    bpy.context.scene.mobius.collisions = "replace"
+    bpy.context.scene.mobius.kinds = {"UV", "MATERIALS"}
+    lines = drawn(panel.MOBIUS_PT_transfer)
+    assert "Replaced on the target: UVMap, Materials" in lines
+    assert not [line for line in lines if line.startswith("Stays")]
+    bpy.context.scene.mobius.carry_to = "selected"  # none of which is aligned
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+    bpy.context.scene.mobius.target = source
+    bpy.context.scene.mobius.carry_to = "target"
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
