@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.util
 import os
@@ -50,8 +51,10 @@ def leave(status: int) -> None:
 
     Blender's module, once loaded, sometimes waits for its own threads for ever in the C library's exit handlers.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        # closed, or its reader has gone
+        with contextlib.suppress(AttributeError, OSError):
+            stream.flush()
     if "bpy" in sys.modules and (folder := sys.modules["bpy"].app.tempdir):
         shutil.rmtree(folder, ignore_errors=True)
     os._exit(status)
