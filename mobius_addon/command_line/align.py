@@ -26,9 +26,7 @@ def run(options: argparse.Namespace) -> int:
     require_writable(others=[options.map, options.report])
     new_scene()
     source, target = import_pair(options)
-    alignment, correspondence = align_pair(
-        options, (source, target), read_pair(options, source, target), settings
-    )
+    alignment, correspondence = align_pair(options, (source, target), read_pair(options, source, target), settings)
     with outputs() as written:
         if options.map:
             save_map(written.path(options.map), alignment, correspondence)

@@ -22,7 +22,9 @@ def import_pair(options: argparse.Namespace, *, writes_target: bool = False) -> 
 
     if _same_mesh(options.source, options.target):
         raise Refusal(f"'{options.source}' is both source and target: give two meshes")
-    target = import_mesh(options.target, writes=writes_target)  # first, so that its materials and images keep their names
+    target = import_mesh(
+        options.target, writes=writes_target
+    )  # first, so that its materials and images keep their names
     return import_mesh(options.source), target
 
 

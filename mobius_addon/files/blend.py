@@ -44,7 +44,9 @@ def read(path: str) -> list[bpy.types.Object]:
 def missing_libraries() -> list[str]:
     """Return the names of linked files that are not there."""
     return sorted(
-        Path(library.filepath).name for library in bpy.data.libraries if not Path(bpy.path.abspath(library.filepath)).is_file()
+        Path(library.filepath).name
+        for library in bpy.data.libraries
+        if not Path(bpy.path.abspath(library.filepath)).is_file()
     )
 
 

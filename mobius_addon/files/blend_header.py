@@ -6,7 +6,7 @@ import gzip
 import struct
 import zlib
 from pathlib import Path
-from typing import IO
+from typing import BinaryIO
 
 from .unreadable import Unreadable, cut_short
 
@@ -22,7 +22,9 @@ def check(path: Path) -> None:
         if start == _ZSTD:
             file.seek(-4, 2)
             if file.read(4) != _SEEK_TABLE:
-                raise Unreadable(f"'{path}' is cut short or damaged: its compressed data does not end as Blender's does")
+                raise Unreadable(
+                    f"'{path}' is cut short or damaged: its compressed data does not end as Blender's does"
+                )
             return
         file.seek(0)
         if start[:2] != _GZIP:
@@ -35,7 +37,7 @@ def check(path: Path) -> None:
             raise Unreadable(f"'{path}' is cut short or damaged: {error}") from error
 
 
-def _follow_blocks(path: Path, file: IO[bytes], size: int | None) -> None:
+def _follow_blocks(path: Path, file: BinaryIO | gzip.GzipFile, size: int | None) -> None:
     """Go from block to block until the one that says it is the last."""
     start = file.read(7)
     if start != b"BLENDER":

@@ -19,7 +19,7 @@ def read(path: str) -> None:
         nibabel is not there, or the file holds no surface.
     """
     try:
-        from nibabel.gifti import GiftiImage
+        from nibabel.gifti.gifti import GiftiImage
     except ImportError as error:
         raise Unreadable(
             f"'{path}' is read by the Python package 'nibabel', which is not installed here: "

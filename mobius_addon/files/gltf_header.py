@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from .unreadable import Unreadable, cut_short
+import numpy as np
+
+from .unreadable import Unreadable, cut_short, no_numbers
 
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _COMPONENT_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_FLOAT = 5126
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
@@ -26,12 +30,12 @@ def check(path: Path) -> None:
         raise Unreadable(f"'{path}' is cut short or damaged: its JSON ends in an error ({error})") from error
     try:
         _follow(path, description, own)
-    except (AttributeError, IndexError, KeyError, OverflowError, TypeError) as error:
+    except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise Unreadable(f"'{path}' is damaged: its JSON does not describe a scene ({error!r})") from error
 
 
-def _chunks(path: Path, content: bytes) -> tuple[bytes, int | None]:
-    """Return the JSON of a .glb and how many bytes its own buffer has."""
+def _chunks(path: Path, content: bytes) -> tuple[bytes, memoryview | None]:
+    """Return the JSON of a .glb and its own buffer."""
     if len(content) < 20:
         raise cut_short(path, "it ends in its header", 20, len(content))
     length = struct.unpack_from("<I", content, 8)[0]
@@ -46,25 +50,24 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, int | None]:
         if kind == _JSON:
             text = content[place : place + size]
         elif kind == _BIN:
-            own = size
+            own = memoryview(content)[place : place + size]
         place += size
     return text, own
 
 
-def _follow(path: Path, description: dict[str, Any], own: int | None) -> None:
+def _follow(path: Path, description: dict[str, Any], own: memoryview | None) -> None:
     """Compare accessors with their buffer views, these with their buffers, and these with what there is."""
     buffers = description.get("buffers", [])
-    for number, buffer in enumerate(buffers):
-        if "extensions" not in buffer:
-            _require_bytes(path, buffer.get("uri"), buffer["byteLength"], own if number == 0 else None)
+    held = [_buffer(path, buffer, own if number == 0 else None) for number, buffer in enumerate(buffers)]
     views = description.get("bufferViews", [])
     for view in views:
         end = view.get("byteOffset", 0) + view["byteLength"]
         # compressed ones stand for bytes that come to be when it is read
         if "extensions" not in view and end > buffers[view["buffer"]]["byteLength"]:
             raise cut_short(path, "a part of a buffer goes on", end, buffers[view["buffer"]]["byteLength"])
+    accessors = description.get("accessors", [])
     counts = [0]
-    for accessor in description.get("accessors", []):
+    for accessor in accessors:
         count = accessor["count"]
         if "bufferView" in accessor:
             view = views[accessor["bufferView"]]
@@ -73,26 +76,47 @@ def _follow(path: Path, description: dict[str, Any], own: int | None) -> None:
             if count < 1 or end > view["byteLength"]:
                 raise cut_short(path, f"it asks for {count:,} values", end, view["byteLength"])
             counts.append(count)
-    if "KHR_draco_mesh_compression" in description.get("extensionsUsed", []):
-        return  # how many there are is in the compressed data
-    # without bytes of their own are only the sparse ones: changes of others, which have as many
-    for accessor in description.get("accessors", []):
-        if accessor["count"] > max(counts):
-            raise Unreadable(f"'{path}' is damaged: it asks for {accessor['count']:,} values and holds no bytes of them")
+    # without bytes of their own are the sparse ones, changes of others, which have as many; and those that Draco packs
+    if "KHR_draco_mesh_compression" not in description.get("extensionsUsed", []):
+        for count in (accessor["count"] for accessor in accessors if accessor["count"] > max(counts)):
+            raise Unreadable(f"'{path}' is damaged: it asks for {count:,} values and holds no bytes of them")
+    for number in {
+        primitive["attributes"]["POSITION"]
+        for mesh in description.get("meshes", [])
+        for primitive in mesh["primitives"]
+        if "POSITION" in primitive["attributes"]
+    }:
+        _require_numbers(path, accessors[number], views, held)
 
 
-def _require_bytes(path: Path, uri: str | None, needed: int, own: int | None) -> None:
-    """Raise `Unreadable` if a buffer is not there or too short; `own` is the size of the one in the .glb itself."""
+def _require_numbers(path: Path, accessor: dict[str, Any], views: list[Any], held: list[memoryview | None]) -> None:
+    """Raise `Unreadable` if a position is none."""
+    view = views[accessor["bufferView"]] if "bufferView" in accessor else None
+    if view is None or accessor["componentType"] != _FLOAT or "extensions" in view:
+        return
+    content = held[view["buffer"]]
+    if content is not None:
+        start, step = view.get("byteOffset", 0) + accessor.get("byteOffset", 0), view.get("byteStride", 12)
+        places = np.ndarray((accessor["count"], 3), "<f4", content, start, (step, 4))
+        if (wrong := np.flatnonzero(~np.isfinite(places).all(axis=1))).size:
+            raise no_numbers(path, wrong.size, f"vertex {wrong[0]:,}")
+
+
+def _buffer(path: Path, buffer: dict[str, Any], own: memoryview | None) -> memoryview | None:
+    """Return what is in a buffer; `own` is what the .glb itself has for it. Of a compressed one nothing is known."""
+    uri, needed = buffer.get("uri"), buffer["byteLength"]
+    if "extensions" in buffer:
+        return None
+    asked = "it names the length of its buffer"
     if uri is None:
-        if needed > (own or 0):
-            raise cut_short(path, "it names the length of its buffer", needed, own or 0)
+        held = own or memoryview(b"")
     elif uri.startswith("data:"):
-        held = len(uri.partition(",")[2]) * 3 // 4
-        if needed > held:
-            raise cut_short(path, "it names the length of its buffer", needed, held)
+        held = memoryview(base64.b64decode(uri.partition(",")[2]))
     else:
         beside = path.parent / unquote(uri)
         if not beside.is_file():
             raise Unreadable(f"'{path}' needs '{beside.name}' beside it, which is not there")
-        if needed > beside.stat().st_size:
-            raise cut_short(beside, f"'{path.name}' names its length", needed, beside.stat().st_size)
+        held, asked = memoryview(beside.read_bytes()), f"it names the length of '{beside.name}'"
+    if needed > len(held):
+        raise cut_short(path, asked, needed, len(held))
+    return held

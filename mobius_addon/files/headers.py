@@ -1,6 +1,7 @@
 """What a file says of itself, compared with what it holds: a file cut short never reaches Blender's importers.
 
-These take a header's counts on trust: they make room for all of it before they read, and may end the process.
+These take a header's counts on trust: they make room for all of it before they read, and may end the process. Of
+coordinates that are no numbers they make zeros without a word.
 """
 
 from __future__ import annotations
@@ -10,21 +11,16 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from . import blend_header, gltf_header
-from .unreadable import Unreadable, cut_short
+import numpy as np
 
-_PLY_SIZES = {
-    **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
-    **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
-    **dict.fromkeys(("int", "uint", "float", "int32", "uint32", "float32"), 4),
-    **dict.fromkeys(("double", "float64"), 8),
-}
-_LONGEST_HEADER = 1 << 20
-"""Bytes in which the header of a PLY file ends; those with a thousand comments have a tenth of it."""
+from . import blend_header, fbx_header, gltf_header, ply_header
+from .unreadable import Unreadable, cut_short, no_numbers
+
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
 
 
 def require_sound(path: Path) -> None:
-    """Raise `Unreadable` if a file is shorter than its header says, or its header says nothing that can be.
+    """Raise `Unreadable` if a file is shorter than its header says, its header makes no sense, or a point is nowhere.
 
     Parameters
     ----------
@@ -40,54 +36,21 @@ def require_sound(path: Path) -> None:
         raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
 
 
-def _check_ply(path: Path) -> None:
-    """Compare what the elements of a PLY file take at the least with what follows its header."""
-    with path.open("rb") as file:
-        start = file.read(_LONGEST_HEADER)
-    size = path.stat().st_size
-    # \s takes all three kinds of line ends
-    end = re.search(rb"(?:\A|[\r\n])end_header[ \t]*(?:\r\n|\r|\n|\Z)", start)
-    if not start.startswith(b"ply") or end is None:
-        raise Unreadable(f"'{path}' could not be read: it does not begin with the header of a PLY file")
-    ascii_text, elements = True, []
-    for line in re.split(r"[\r\n]+", start[: end.start() + 1].decode("latin-1")):
-        words = line.split()
-        if words[:1] == ["format"]:
-            ascii_text = words[1:2] == ["ascii"]
-        elif words[:1] == ["element"] and len(words) == 3:
-            if not words[2].isdecimal():
-                raise Unreadable(f"'{path}' could not be read: its header asks for '{words[2]}' of '{words[1]}'")
-            elements.append((words[1], int(words[2]), []))
-        elif words[:1] == ["property"] and len(words) >= 3 and elements:
-            # of a list there is at least its length
-            elements[-1][2].append(words[2] if words[1] == "list" else words[1])
-    need = 0
-    for _, count, kinds in elements:
-        # in a text every value is a digit and a blank
-        row = 2 * len(kinds) if ascii_text else sum(_PLY_SIZES.get(kind, 1) for kind in kinds)
-        need += count * max(row, 1)
-    if ascii_text and need:
-        need -= 1  # the last blank may be missing
-    if need > size - end.end():
-        asked = " and ".join(f"{count:,} of '{name}'" for name, count, _ in elements)
-        raise cut_short(path, f"its header asks for {asked}", need, size - end.end())
-
-
 def _check_stl(path: Path) -> None:
-    """Compare the number of triangles in a binary STL file, or the last line of a text, with the file's length."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        start = file.read(84)
-        file.seek(max(0, size - 4096))
-        end = file.read()
-    count = struct.unpack_from("<I", start, 80)[0] if len(start) == 84 else 0
+    """Compare the number of triangles in a binary STL file with its length; of a text, look at the last line."""
+    content = path.read_bytes()
+    size = len(content)
+    count = struct.unpack_from("<I", content, 80)[0] if size >= 84 else 0
     need = 84 + 50 * count
-    if len(start) == 84 and need == size:
-        return
-    if start.lstrip()[:5].lower() == b"solid" and b"\0" not in start + end:
-        if b"endsolid" not in end.lower():
+    if size >= 84 and need == size:
+        corners = np.frombuffer(content, _TRIANGLE, count, 84)["corners"]
+        if (wrong := np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))).size:
+            raise no_numbers(path, wrong.size, f"in triangle {wrong[0]:,}")
+    elif content[:80].lstrip()[:5].lower() == b"solid" and b"\0" not in content[:4096]:
+        if b"endsolid" not in content[-4096:].lower():
             raise Unreadable(f"'{path}' is cut short: it does not end with 'endsolid', as an STL text does")
-    elif need > size or len(start) < 84:
+        _require_numbers(path, content, b"vertex")
+    elif need > size or size < 84:
         raise cut_short(path, f"its header asks for {count:,} triangles", need, size)
     else:
         raise Unreadable(
@@ -95,30 +58,17 @@ def _check_stl(path: Path) -> None:
         )
 
 
-def _check_fbx(path: Path) -> None:
-    """Follow the outermost records of a binary FBX file, each of which says where it ends."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        start = file.read(27)
-        if start[:20] != b"Kaydara FBX Binary  ":
-            return  # a text, which Blender refuses with a sentence of its own
-        if len(start) < 27:
-            raise cut_short(path, "it ends in its header", 27, size)
-        form = "<I" if struct.unpack_from("<I", start, 23)[0] < 7500 else "<Q"
-        place = 27
-        while True:
-            file.seek(place)
-            field = file.read(struct.calcsize(form))
-            if len(field) < struct.calcsize(form):
-                raise cut_short(path, "its last record is not there", place + struct.calcsize(form), size)
-            following = struct.unpack(form, field)[0]
-            if following == 0:
-                return
-            if following > size:
-                raise cut_short(path, "one of its records goes on", following, size)
-            if following <= place:
-                raise Unreadable(f"'{path}' is damaged: a record at byte {place:,} ends at byte {following:,}")
-            place = following
+def _check_obj(path: Path) -> None:
+    """Look for points that are nowhere; an OBJ file has no header."""
+    _require_numbers(path, path.read_bytes(), b"v")
+
+
+def _require_numbers(path: Path, content: bytes, keyword: bytes) -> None:
+    """Raise `Unreadable` if a line that begins with a keyword has nan or inf in it."""
+    wrong = list(re.finditer(rb"(?im)^[ \t]*" + keyword + rb"[ \t][^\r\n#]*(?:nan|inf)", content))
+    if wrong:
+        line = content.count(b"\n", 0, wrong[0].start()) + 1
+        raise no_numbers(path, len(wrong), f"on line {line:,}")
 
 
 def _check_usd(path: Path) -> None:
@@ -146,10 +96,11 @@ def _check_usd(path: Path) -> None:
 
 _CHECKS: dict[str, Callable[[Path], None]] = {
     ".blend": blend_header.check,
-    ".fbx": _check_fbx,
+    ".fbx": fbx_header.check,
     ".glb": gltf_header.check,
     ".gltf": gltf_header.check,
-    ".ply": _check_ply,
+    ".obj": _check_obj,
+    ".ply": ply_header.check,
     ".stl": _check_stl,
     ".usd": _check_usd,
     ".usdc": _check_usd,

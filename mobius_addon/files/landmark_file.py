@@ -1,4 +1,4 @@
-"""Pairs of points that the user knows, in a text file: by vertex numbers, or by coordinates as the mesh files have them."""
+"""Pairs of points that the user knows, in a file: vertex numbers, or coordinates as the mesh files have them."""
 
 from __future__ import annotations
 
@@ -63,12 +63,13 @@ def read_landmarks(
     for side, (imported, mesh) in enumerate(zip(files, meshes, strict=True)):
         numbered = [k for k, pair in enumerate(pairs) if pair.by_number]
         for k in numbered:
-            rows[k, side] = number = pairs[k].sides[side]
+            number = pairs[k].sides[side]
             if not 0 <= number < len(mesh.vertices):
                 raise Unreadable(
                     f"'{path}', line {pairs[k].line}: '{mesh.name}' has no vertex {number:,}: "
                     f"it has 0 to {len(mesh.vertices) - 1:,}"
                 )
+            rows[k, side] = number
         if numbered and (reason := imported.order_change()):
             warnings.append(f"'{path}' may count the vertices of '{imported.path}' otherwise: {reason}")
         placed = [k for k, pair in enumerate(pairs) if not pair.by_number]

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...solver.surface.mesh import Floats, Integers
-from .unreadable import Unreadable
+from .unreadable import Unreadable, no_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +36,16 @@ def put_into_scene(polygons: Polygons, path: Path) -> None:
     Raises
     ------
     Unreadable
-        A polygon has a vertex that is not there.
+        A polygon has a vertex that is not there, or a vertex is at no place.
     """
+    # Blender would take them for 0
+    if (wrong := np.flatnonzero(~np.isfinite(polygons.vertices).all(axis=1))).size:
+        raise no_numbers(path, wrong.size, f"vertex {wrong[0]:,}")
     count = len(polygons.vertices)
     outside = (polygons.corners < 0) | (polygons.corners >= count)
     if outside.any():
-        wrong = int(polygons.corners[outside][0])
-        raise Unreadable(f"'{path}' is damaged: a polygon has vertex {wrong:,}, but there are {count:,}, from 0")
+        gone = int(polygons.corners[outside][0])
+        raise Unreadable(f"'{path}' is damaged: a polygon has vertex {gone:,}, but there are {count:,}, from 0")
     kept = polygons.sizes >= 3  # points and lines among them
     corners = polygons.corners[np.repeat(kept, polygons.sizes)]
     sizes = polygons.sizes[kept]

@@ -14,7 +14,7 @@ from ..streams import quiet
 from .blend import missing_libraries, require_local
 from .formats import first_message, reader_of, split_object_name
 from .headers import require_sound
-from .unreadable import Unreadable
+from .unreadable import Unreadable, no_numbers
 
 
 def new_scene() -> None:
@@ -100,11 +100,14 @@ def import_meshes(path: Path) -> list[Imported]:
         raise Unreadable(f"'{path}' could not be read: {first_message(error)}") from error
     finally:
         found = [Imported(path, obj.name, obj) for obj in objects]
-        for imported in found:
-            if imported.obj.library is None and imported.name in local.values():
-                imported.obj.name = f"{imported.name}.001"
+        given = set(local.values())
+        twins = [x for x in found if x.obj.library is None and x.name in given]
+        for number, imported in enumerate(twins):
+            imported.obj.name = f".mobius-twin-{number}"
         for obj, name in local.items():
             obj.name = name
+        for imported in twins:
+            imported.obj.name = imported.name  # Blender adds a number
     bpy.context.view_layer.update()
     meshes = [replace(x, joined=form.join(x.obj.data)) for x in _scans(found)]
     if not any(len(x.obj.data.vertices) for x in meshes):
@@ -199,9 +202,5 @@ def _listed(meshes: list[Imported]) -> str:
 def require_places(imported: Imported) -> None:
     """Raise `Unreadable` if a vertex is at no place."""
     places = foreach(imported.obj.data.vertices, "co", 3, np.float32)
-    wrong = np.flatnonzero(~np.isfinite(places).all(axis=1))
-    if wrong.size:
-        raise Unreadable(
-            f"'{imported.path}' is damaged: {wrong.size:,} vertices of '{imported.name}' have coordinates that are no "
-            f"numbers; the first is vertex {wrong[0]:,}"
-        )
+    if (wrong := np.flatnonzero(~np.isfinite(places).all(axis=1))).size:
+        raise no_numbers(imported.path, wrong.size, f"vertex {wrong[0]:,} of '{imported.name}'")

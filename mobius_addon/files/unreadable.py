@@ -13,4 +13,12 @@ class Unreadable(Refusal):
 
 def cut_short(path: Path, asked: str, needed: int, held: int) -> Unreadable:
     """Return the error of a file that holds fewer bytes than it says; `asked` tells where it says so."""
-    return Unreadable(f"'{path}' is cut short or damaged: {asked}, which takes {needed:,} bytes, but there are {held:,}")
+    return Unreadable(
+        f"'{path}' is cut short or damaged: {asked}, which takes {needed:,} bytes, but there are {held:,}"
+    )
+
+
+def no_numbers(path: Path, count: int, first: str) -> Unreadable:
+    """Return the error of a file with points whose coordinates are nan or infinite; `first` says where one is."""
+    points = "a point" if count == 1 else f"{count:,} points"
+    return Unreadable(f"'{path}' is damaged: the coordinates of {points} are no numbers; the first is {first}")

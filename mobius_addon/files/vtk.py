@@ -95,7 +95,8 @@ def read(path: str) -> None:
         It is none, or damaged.
     """
     content = _Content(Path(path))
-    points, cells, types, kind = np.empty((0, 3)), {}, None, ""
+    points, types, kind = np.empty((0, 3)), None, ""
+    cells: dict[str, tuple[Integers, Integers]] = {}
     while words := content.words():
         keyword = words[0].upper()
         try:
