@@ -34,7 +34,8 @@ def main() -> int:
     try:
         if sys.argv[1:2] == ["build"]:
             return importlib.import_module(f"{PACKAGE}.release.build").main(sys.argv[2:])
-        return importlib.import_module(f"{PACKAGE}.mobius_addon.command_line").main_quietly(sys.argv[1:])
+        command_line = importlib.import_module(f"{PACKAGE}.mobius_addon.command_line")
+        return command_line.guarded(lambda: command_line.main_quietly(sys.argv[1:]))
     except ImportError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in ("bpy", "numpy", "scipy"):

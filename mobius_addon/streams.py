@@ -1,4 +1,7 @@
-"""What the commands write for people, how they end, and where the chatter of Blender and its importers goes."""
+"""What the commands write for people, how they end, and where the chatter of Blender and its importers goes.
+
+And what they are reading, in case that ends them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from mmap import mmap
+from pathlib import Path
 from typing import TextIO
 
 DONE, NOT_ALIGNED, UNUSABLE = 0, 1, 2
@@ -93,6 +98,34 @@ def take_streams() -> None:
             setattr(sys, name, os.fdopen(os.dup(descriptor), "w", encoding="utf-8", errors="replace", buffering=1))
         os.dup2(nowhere, descriptor)
     os.close(nowhere)
+
+
+_board: mmap | None = None
+
+
+def pin(board: mmap) -> None:
+    """Note from now on what is being read on a board that another process looks at, should this one end."""
+    global _board
+    _board = board
+
+
+def pinned(board: mmap) -> str:
+    """Return what was being read when the process that noted it ended; empty if nothing was."""
+    return board[:].split(b"\0", 1)[0].decode("utf-8", "replace")
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Note that a file is being read by something that may end the process."""
+    if _board is None:
+        yield
+        return
+    noted = os.fsencode(path)[: len(_board) - 1] + b"\0"
+    _board[: len(noted)] = noted
+    try:
+        yield
+    finally:
+        _board[:1] = b"\0"
 
 
 @contextmanager

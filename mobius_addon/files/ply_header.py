@@ -52,7 +52,7 @@ def check(path: Path) -> None:
     end = re.search(rb"[\r\n]end_header[ \t]*(?:\r\n|\r|\n|\Z)", content)
     if not content.startswith(b"ply") or end is None:
         raise Unreadable(f"'{path}' could not be read: it does not begin with the header of a PLY file")
-    order, elements = _header(path, content[: end.start()].decode("latin-1"))
+    order, elements = _header(path, content[: end.start()])
     body = content[end.end() :]
     # in a text every value is a digit and a blank, which the last may lack
     need = sum(x.count * max(1, struct.calcsize("=" + x.least) if order else 2 * len(x.least)) for x in elements)
@@ -74,13 +74,13 @@ def check(path: Path) -> None:
         raise Unreadable(f"'{path}' is cut short or damaged: its faces or edges cannot be read ({error})") from error
 
 
-def _header(path: Path, text: str) -> tuple[str, list[_Element]]:
+def _header(path: Path, content: bytes) -> tuple[str, list[_Element]]:
     """Return the byte order, empty for text, and the elements."""
     order, elements = None, []
-    for line in re.split(r"[\r\n]+", text)[1:]:
-        words = line.split()
-        match words:
-            case [] | ["comment" | "obj_info", *_]:
+    # other blanks than these stay in their words, as in Blender's importer
+    for line in re.split(r"[\r\n]+", content.decode("ascii", "replace"))[1:]:
+        match re.split(r"[ \t]+", line.strip(" \t")):
+            case [""] | ["comment" | "obj_info", *_]:
                 continue
             case ["format", form, _] if form in _ORDERS:
                 order = _ORDERS[form]

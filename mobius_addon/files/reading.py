@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from ...solver.surface.mesh import Floats
 from ..mesh_data import foreach, mirrored
-from ..streams import quiet
+from ..streams import quiet, reading
 from .blend import missing_libraries, require_local
 from .formats import first_message, reader_of, split_object_name
 from .headers import require_sound
@@ -84,6 +85,16 @@ def import_meshes(path: Path) -> list[Imported]:
     form = reader_of(path)
     _require_file(path)
     require_sound(path)
+    with reading(path):
+        meshes = _scans(_import(path, form.importer))
+        meshes = [replace(x, joined=form.join(x.obj.data)) for x in meshes]
+    if not any(len(x.obj.data.vertices) for x in meshes):
+        raise Unreadable(f"'{path}' holds no mesh{_what_is_missing()}")
+    return meshes
+
+
+def _import(path: Path, importer: Callable[[str], object]) -> list[Imported]:
+    """Return all objects of a file, which bear their names there unless the scene's others have these."""
     # set the scene's names aside, so that imported objects keep theirs; linked ones have names of their own
     before = {obj: obj.name for obj in bpy.data.objects}
     local = {obj: name for obj, name in before.items() if obj.library is None}
@@ -92,7 +103,7 @@ def import_meshes(path: Path) -> list[Imported]:
     objects: list[bpy.types.Object] = []
     try:
         with quiet():
-            listed = form.importer(str(path.resolve()))
+            listed = importer(str(path.resolve()))
         objects = listed if isinstance(listed, list) else [obj for obj in bpy.data.objects if obj not in before]
     except Unreadable as error:
         raise Unreadable(str(error).replace(str(path.resolve()), str(path))) from error
@@ -109,10 +120,7 @@ def import_meshes(path: Path) -> list[Imported]:
         for imported in twins:
             imported.obj.name = imported.name  # Blender adds a number
     bpy.context.view_layer.update()
-    meshes = [replace(x, joined=form.join(x.obj.data)) for x in _scans(found)]
-    if not any(len(x.obj.data.vertices) for x in meshes):
-        raise Unreadable(f"'{path}' holds no mesh{_what_is_missing()}")
-    return meshes
+    return found
 
 
 def _require_file(path: Path) -> None:

@@ -164,6 +164,7 @@ def longer_array(content: bytes) -> bytes:
         ("sheet.ply", replaced(b"element vertex ", b"element vertex 9999999"), "its header asks for 9,999,999"),
         ("text.ply", replaced(b"element face ", b"element face 1000000000000"), "its header asks for"),
         ("sheet.ply", replaced(b"element vertex ", b"element vertex -"), "its header says 'element vertex -"),
+        ("sheet.ply", replaced(b"element vertex ", b"element vertex\xa0"), "which PLY does not know"),
         ("sheet.ply", replaced(b"vertex_indices", b"vertex_indikes"), "its faces have no list of vertices"),
         (
             "sheet.ply",
