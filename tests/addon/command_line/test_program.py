@@ -63,9 +63,10 @@ sys.exit(guarded(run))
     [
         ("return 0", 0, ""),
         ("return 1", 1, ""),
-        ("with streams.reading(Path('a scan.usdc')): os.kill(os.getpid(), signal.SIGSEGV)", 2,
-         "mobius: 'a scan.usdc' could not be read: it ends Blender (Segmentation fault), so it is damaged or too large\n"),
-        ("with streams.reading(Path('x')): pass\n    os.kill(os.getpid(), signal.SIGABRT)", 134, "mobius: ended: Aborted\n"),
+        ("with streams.reading(Path('a.usdc')): os.kill(os.getpid(), signal.SIGSEGV)", 2,
+         "mobius: 'a.usdc' could not be read: it ends Blender (Segmentation fault), so it is damaged or too large\n"),
+        ("with streams.reading(Path('x')): pass\n    os.kill(os.getpid(), signal.SIGABRT)", 134,
+         "mobius: ended: Aborted\n"),
     ],
 )  # fmt: skip
 def test_a_crash_while_a_file_is_read_is_a_sentence(code: str, status: int, said: str) -> None:
