@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import struct
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -124,7 +125,8 @@ def _nowhere_in_text(body: bytes, _order: str, elements: list[_Element]) -> list
     """Return the vertices whose coordinates are no numbers, if they come first."""
     element = elements[0]
     columns = [k for k, (name, _, _) in enumerate(element.properties) if name in _AXES]
-    if element.name != "vertex" or not re.search(rb"(?i)nan|inf", body):
+    small = body.lower()
+    if element.name != "vertex" or (b"nan" not in small and b"inf" not in small):
         return []
     return [
         k
@@ -153,20 +155,39 @@ def _binary(body: bytes, order: str, elements: list[_Element]) -> Iterator[Integ
             place += uniform.nbytes
             yield from (uniform[f"p{k}"].ravel().astype(np.intp) for k in joins)
             continue
-        found: list[int] = []
-        for _ in range(element.count):
-            for k, (_, kind, length) in enumerate(element.properties):
-                count = 1
-                if length:
-                    count = struct.unpack_from(order + length, body, place)[0]
-                    place += struct.calcsize("=" + length)
-                size = count * struct.calcsize("=" + kind)
-                if count < 0 or place + size > len(body):
-                    raise ValueError("a list goes on beyond the end")
-                if k in joins:
-                    found += struct.unpack_from(f"{order}{count}{kind}", body, place)
-                place += size
-        yield np.array(found, np.intp)
+        found, place = _rows_of_any_size(body, place, order, element, joins)
+        yield found
+
+
+def _rows_of_any_size(body: bytes, place: int, order: str, element: _Element, joins: list[int]) -> tuple[Integers, int]:
+    """Return the numbers of vertices in all rows of an element, and where it ends."""
+    starts: dict[tuple[str, int], list[int]] = {}
+    sizes = [
+        (k in joins, kind, struct.calcsize("=" + kind), length)
+        for k, (_, kind, length) in enumerate(element.properties)
+    ]
+    for _ in range(element.count):
+        for joined, kind, size, length in sizes:
+            count = 1
+            if length == "B":  # in all scans, and quick
+                count, place = body[place], place + 1
+            elif length:
+                count = struct.unpack_from(order + length, body, place)[0]
+                place += struct.calcsize("=" + length)
+            if joined and count:
+                starts.setdefault((kind, count), []).append(place)
+            if count < 0:
+                raise ValueError("a list has a length below 0")
+            place += count * size
+    if place > len(body):
+        raise ValueError("a list goes on beyond the end")
+    content = np.frombuffer(body, np.uint8)
+    found = [np.empty(0, np.intp)]
+    for (kind, count), places in starts.items():
+        form = np.dtype(order + kind)
+        rows = content[np.array(places)[:, None] + np.arange(count * form.itemsize)]
+        found.append(rows.view(form).ravel().astype(np.intp))
+    return np.concatenate(found), place
 
 
 def _rows_of_one_size(body: bytes, place: int, order: str, element: _Element) -> np.ndarray | None:
@@ -195,21 +216,40 @@ def _text(body: bytes, elements: list[_Element]) -> Iterator[Integers]:
     lines = body.splitlines()
     place = 0
     for element in elements:
-        joins, found = _joins(element), []
-        if place + element.count > len(lines):
-            raise ValueError(
-                f"{element.count:,} of '{element.name}' are asked for, {len(lines) - place:,} lines are left"
-            )
-        for line in lines[place : place + element.count] if joins else ():
-            words, at = line.split(), 0
+        joins, rows = _joins(element), lines[place : place + element.count]
+        if len(rows) < element.count:
+            raise ValueError(f"{element.count:,} of '{element.name}' are asked for, {len(rows):,} lines are left")
+        place += element.count
+        if not joins or not rows:
+            continue
+        uniform = _columns(rows, element)
+        if uniform is not None:
+            yield uniform[:, 1:].astype(np.intp).ravel()
+            continue
+        found: list[int] = []
+        for row in rows:
+            words, at = row.split(), 0
             for k, (_, _, length) in enumerate(element.properties):
                 count = 1
                 if length:
                     count, at = int(words[at]), at + 1
                 if count < 0 or at + count > len(words):
-                    raise ValueError(f"'{line[:40].decode('latin-1')}' has too few numbers")
+                    raise ValueError(f"'{row[:40].decode('latin-1')}' has too few numbers")
                 if k in joins:
                     found += map(int, words[at : at + count])
                 at += count
-        place += element.count
         yield np.array(found, np.intp)
+
+
+def _columns(rows: list[bytes], element: _Element) -> np.ndarray | None:
+    """Return the numbers of an element's lines, if it has one list and that is as long on each line; else None."""
+    width = len(rows[0].split())
+    if len(element.properties) != 1 or element.properties[0][2] is None:
+        return None
+    # a number that is none ends what is read
+    with warnings.catch_warnings(action="ignore"):
+        values = np.fromstring(b" ".join(rows), sep=" ")
+    if values.size != width * len(rows) or not np.isfinite(values).all():
+        return None
+    table = values.reshape(-1, width)
+    return table if (table[:, 0] == width - 1).all() and (np.abs(table) < 2**53).all() else None
