@@ -5,7 +5,7 @@ checked and measured (`surface`), flattened (`flatten`), searched for the best `
 onto the other surface (`bend`), aligned as a whole (`align`) and turned into a dense map that carries values (`carry`).
 """
 
-from .align import Alignment, AlignSettings, Surface, align, prepare
+from .align import Alignment, AlignSettings, Surface, align, load_surface, prepare, save_surface
 from .carry import Correspondence, correspond, interpolate, interpolate_corners, load_map, report, save_map
 from .flatten import Distortion, Flattening, flatten, silhouette_mesh
 from .mobius import Mobius
@@ -36,10 +36,12 @@ __all__ = [
     "interpolate",
     "interpolate_corners",
     "load_map",
+    "load_surface",
     "prepare",
     "report",
     "require_disc",
     "save_map",
+    "save_surface",
     "search",
     "silhouette_mesh",
     "topology",

@@ -7,5 +7,6 @@ from .alignment import Alignment
 from .pipeline import align
 from .prepared import Surface, prepare
 from .settings import AlignSettings
+from .surface_file import load_surface, save_surface
 
-__all__ = ["AlignSettings", "Alignment", "Surface", "align", "prepare"]
+__all__ = ["AlignSettings", "Alignment", "Surface", "align", "load_surface", "prepare", "save_surface"]

@@ -59,7 +59,7 @@ def bent_densely(
         for _ in range(DRAFTS - 1):
             # pose and scale again, from where the surfaces meet
             believed = np.where(there, 1.0, 1e-3)
-            draft = drafted(found.mobius, source, target, believed, draft.places(target), ROUNDS, still)
+            draft = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, still)
             before = here, there
             here, there = shared(draft, source, target, still)
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:

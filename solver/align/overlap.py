@@ -31,7 +31,7 @@ def shared(
     `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
     """
     tell = progress or (lambda _: None)
-    places = draft.places(target)
+    places = draft.places()
     bent = TriangleMesh(places, draft.whole.faces)
     onto = draft.onto
     back = SurfacePoints(bent, (target.boundary, *target.holes), onto.normal_weight)

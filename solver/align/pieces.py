@@ -66,7 +66,7 @@ def overlap_of(
     clock.begin("bend", "Bending", 0.5)
     scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
-    start = scale * (draft.places(found.target)[target_part.vertices] - middle)
+    start = scale * (draft.places()[target_part.vertices] - middle)
     again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
     _, there = shared(again, inner.source, inner.target, clock.within(0.6, 0.6))
     bending = finished(
@@ -134,7 +134,7 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
 
 def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Booleans) -> Booleans:
     """Return the target vertices, (n,), that are near a boundary that the whole surfaces have, not one of a cut."""
-    places = draft.places(inner.target)
+    places = draft.places()
     loops = np.concatenate([inner.source.boundary, *inner.source.holes])
     nearest = loops[KDTree(draft.onto.mesh.vertices[loops]).query(places)[1]]
     return ~target_cut & ~source_cut[nearest]

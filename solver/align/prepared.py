@@ -34,6 +34,10 @@ class Surface:
         A vertex on the outer boundary; None: the longest boundary is.
     largest_part : bool
         Whether all parts but the one of largest area are left out.
+    measured : (n, d) float64 or None
+        The descriptors, once they are there.
+    points : dict of str to dict of int to (k,) int
+        As "source" and as "target", the points chosen so far, by how many were asked for.
     """
 
     def __init__(
@@ -46,9 +50,12 @@ class Surface:
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
-        self._descriptors: Floats | None = None
-        self._source_points: dict[int, Integers] = {}
-        self._target_points: dict[int, Integers] = {}
+        self.measured: Floats | None = None
+        self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
+
+    def known(self, cleaned: Cleaned, flattening: Flattening) -> None:
+        """Take from elsewhere what would be computed when it is first asked for."""
+        self.__dict__["cleaned"], self.__dict__["flattening"] = cleaned, flattening
 
     @cached_property
     def cleaned(self) -> Cleaned:
@@ -70,23 +77,25 @@ class Surface:
 
         `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
         """
-        if self._descriptors is None:
+        if self.measured is None:
             measured = diffused_curvatures(self.mesh, progress=progress)
-            self._descriptors = standardised(measured, self.mesh.vertex_areas)
-        return self._descriptors
+            self.measured = standardised(measured, self.mesh.vertex_areas)
+        return self.measured
 
     def source_points(self, count: int) -> Integers:
         """Return up to `count` vertices that stand for it as a source."""
-        if count not in self._source_points:
-            self._source_points[count] = source_points(self.flattening, self.descriptors(), count)
-        return self._source_points[count]
+        if count not in self.points["source"]:
+            self.points["source"][count] = source_points(self.flattening, self.descriptors(), count)
+        return self.points["source"][count]
 
     def target_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
         """Return up to `count` vertices that stand for it as a target; `progress` as for `descriptors`."""
-        if count not in self._target_points:
+        if count not in self.points["target"]:
             nowhere = np.empty(0, np.intp)
-            self._target_points[count] = farthest_points(self.mesh, count, nowhere, interior(self.flattening), progress)
-        return self._target_points[count]
+            self.points["target"][count] = farthest_points(
+                self.mesh, count, nowhere, interior(self.flattening), progress
+            )
+        return self.points["target"][count]
 
     @property
     def notes(self) -> tuple[str, ...]:

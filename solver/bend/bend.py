@@ -15,19 +15,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import Delaunay
 
-from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
 from ..flatten.locate import TriangulatedDisc
 from ..mobius import Mobius
 from ..surface.mesh import Booleans, Complexes, Floats, Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
-from ..surface.sampling import thinned
 from ..surface.statistics import weighted_median
+from .coarse import Coarse, coarse
 from .plate import NORMAL_WEIGHT, relaxed
-from .pose import in_pose
-from .rotations import NEAR_BEND_LENGTH, coarsely_bent, following, turned_like
+from .pose import in_pose, misfit, rigidly
+from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold import injective
 
 NODES = 1500
@@ -79,8 +77,8 @@ class Draft:
         Where the Möbius transformation carries each target vertex in the source's disc; nan at vertices in no face.
     unbent : (n, 3) float64
         The target's vertices in the source's scale.
-    nodes : (q,) int
-        Target vertices that are bent.
+    few : Coarse
+        The target by the vertices that are bent.
     flat : TriangleMesh
         The nodes among `unbent`, with faces between them.
     rest, now : (q, 3) float64
@@ -91,24 +89,21 @@ class Draft:
     whole: TriangleMesh
     conformal: Complexes
     unbent: Floats
-    nodes: Integers
+    few: Coarse
     flat: TriangleMesh
     rest: Floats
     now: Floats
 
-    def places(self, target: Flattening) -> Floats:
+    def places(self) -> Floats:
         """Return where all target vertices are, (n, 3), in the frame of `onto`; 0 at vertices in no face."""
-        used = np.flatnonzero(np.isfinite(target.disc.real))
-        places = np.zeros_like(self.unbent)
-        places[used] = following(self.nodes, self.flat, self.now, target.disc, self.unbent, used)
-        return places
+        return self.few.following(self.flat.vertices, self.now, self.unbent)
 
     def located(self, target: Flattening) -> tuple[Integers, Floats]:
         """Return the source's face nearest to each target vertex, (n,), and where in it, (n, 3).
 
         -1 and 0 at vertices in no face.
         """
-        places = self.places(target)
+        places = self.places()
         normals = TriangleMesh(places, self.whole.faces).vertex_normals()
         used = np.flatnonzero(np.isfinite(target.disc.real))
         face, barycentric = np.full(len(places), -1), np.zeros((len(places), 3))
@@ -162,22 +157,43 @@ def drafted(
     whole = TriangleMesh(target.mesh.vertices * mirror, target.mesh.faces[:, order])
 
     tell(0.0)
-    nodes, faces = _coarse(target, NODES, order)
+    few = coarse(target, NODES, order)
+    nodes, faces = few.nodes, few.faces
     tell(0.0)
     places = _positions(conformal[nodes], source, onto) if start is None else start[nodes]
     believed = np.ones(len(nodes)) if trust is None else trust[nodes]
-    unbent = whole.vertices * _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
-    flat = TriangleMesh(unbent[nodes], faces)
-    rest = (
-        coarsely_bent(flat, places, believed)
-        if start is None
-        else turned_like(flat, places, believed, NEAR_BEND_LENGTH)
-    )
+    growth = _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
+    flat = TriangleMesh(whole.vertices[nodes] * growth, faces)
+    if start is None:
+        flat, rest, growth = _best_start(flat, growth, places, believed, 1 / np.sqrt(whole.area), onto)
+    else:
+        rest = in_pose(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
+    unbent = whole.vertices * growth
     tell(0.0)
-    rest = in_pose(TriangleMesh(rest, faces), onto)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
-    return Draft(onto, whole, conformal, unbent, nodes, flat, rest, now)
+    return Draft(onto, whole, conformal, unbent, few, flat, rest, now)
+
+
+def _best_start(
+    flat: TriangleMesh, growth: float, places: Floats, trust: Floats, same_area: float, onto: SurfacePoints
+) -> tuple[TriangleMesh, Floats, float]:
+    """Return the nodes at rest, (q, 3) both unbent and as the bending begins, and their scale.
+
+    Bent as their Möbius images, (q, 3), are, or in one rigid pose with most of these: what is hardly bent is better off
+    unbent, above all where the images err. In the images' scale, `growth`, or in that in which the areas are the same.
+    The one is taken that lies on the source best (`misfit`).
+    """
+    best, least = None, np.inf
+    for scale in (growth, same_area):
+        scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
+        for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
+            rest = in_pose(TriangleMesh(way, flat.faces), onto)
+            apart = misfit(TriangleMesh(rest, flat.faces), onto)
+            if best is None or apart < least:
+                best, least = (scaled, rest, scale), apart
+    assert best is not None
+    return best
 
 
 def finished(
@@ -206,24 +222,24 @@ def finished(
         Keeps the orientation of every triangle in the source's disc.
     """
     tell = progress or (lambda _: None)
-    onto, unbent, flat, nodes, conformal = draft.onto, draft.unbent, draft.flat, draft.nodes, draft.conformal
+    onto, unbent, flat, few, conformal = draft.onto, draft.unbent, draft.flat, draft.few, draft.conformal
     drawn = np.ones(len(target.disc), bool) if alike is None else alike
     used = np.flatnonzero(np.isfinite(target.disc.real))
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:]
-    now = relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[nodes], lambda share: tell(0.5 * share))
+    now = relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
 
     tell(0.5)
-    fine, fine_faces = _coarse(target, FINE_NODES, order)
+    fine = coarse(target, FINE_NODES, order)
     tell(0.5)
-    followed = following(nodes, flat, now, target.disc, unbent, fine)
-    start = following(nodes, flat, draft.rest, target.disc, unbent, fine)
+    followed = few.following(flat.vertices, now, unbent)[fine.nodes]
+    start = few.following(flat.vertices, draft.rest, unbent)[fine.nodes]
     lengths = _lengths(FINE_STIFFNESS, SOFTEST, FINE_ROUNDS)
-    settled = relaxed(start, followed, fine_faces, onto, lengths, drawn[fine], lambda share: tell(0.5 + 0.3 * share))
+    drawn = drawn[fine.nodes]
+    settled = relaxed(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
     tell(0.8)
-    all_places = np.zeros_like(unbent)
-    all_places[used] = following(fine, TriangleMesh(unbent[fine], fine_faces), settled, target.disc, unbent, used)
-    all_places[fine] = settled
+    all_places = fine.following(unbent[fine.nodes], settled, unbent)
+    all_places[fine.nodes] = settled
     normals = TriangleMesh(all_places, draft.whole.faces).vertex_normals()
     face, barycentric = onto.nearest_point(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
@@ -272,30 +288,3 @@ def _growth(mesh: TriangleMesh, places: Floats, trust: Floats) -> float:
     if not some.any():
         return 1.0
     return weighted_median(there[some] / own[some], (trust[i] * trust[j])[some])
-
-
-def _coarse(flattening: Flattening, count: int, order: list[int]) -> tuple[Integers, Integers]:
-    """Return about `count` vertices spread over the surface and the faces, (m, 3), between them.
-
-    The faces index the chosen vertices; they are Delaunay in the disc, with corners in the given order.
-    """
-    disc = flattening.disc
-    inside = np.isfinite(disc.real)
-    if inside.sum() <= count:
-        nodes = np.flatnonzero(inside)
-        place = np.zeros(len(disc), np.intp)
-        place[nodes] = np.arange(len(nodes))
-        return nodes, place[flattening.mesh.faces][:, order]
-    inside[flattening.boundary] = False
-    inner = np.flatnonzero(inside)
-    # as dense along the boundary as inside, for a round surface
-    rim = flattening.boundary[:: max(1, round(len(flattening.boundary) / (3.5 * np.sqrt(count))))]
-    nodes = np.concatenate(
-        [inner[thinned(flattening.mesh.vertices[inner], np.sqrt(0.53 * flattening.mesh.area / count))], rim]
-    )
-    faces = Delaunay(np.stack([disc[nodes].real, disc[nodes].imag], axis=1)).simplices.astype(np.intp)
-    turned = signed_areas(disc[nodes], faces)
-    faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]
-    # where the disc is crowded a node may have slivers alone
-    held, place = np.unique(faces, return_inverse=True)
-    return nodes[held], place.reshape(-1, 3)[:, order]

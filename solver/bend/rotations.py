@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
-from ..flatten.distortion import signed_areas
 from ..flatten.harmonic import factorised
-from ..flatten.locate import TriangulatedDisc
 from ..surface.laplacian import laplacian
-from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
+from ..surface.mesh import Floats, Integers, TriangleMesh
 from .plate import RIM_REACH
 
 BEND_LENGTH = 0.15
@@ -35,10 +33,10 @@ def smooth_rotations(
 
     Averaged over `length`, by trust, (n,).
     """
-    stiffness = laplacian(rest)
+    stiffness = _stiffness(rest)
     i, j = rest.edges.T
     trust = np.ones(len(now)) if trust is None else trust
-    weight = np.maximum(-np.asarray(stiffness[i, j]).ravel(), 0) * np.sqrt(trust[i] * trust[j])
+    weight = -np.asarray(stiffness[i, j]).ravel() * np.sqrt(trust[i] * trust[j])
     products = weight[:, None, None] * (now[i] - now[j])[:, :, None] * (rest.vertices[i] - rest.vertices[j])[:, None, :]
     total = _summed(i, products, len(now)) + _summed(j, products, len(now))
     average = factorised(csc_array(diags_array(rest.vertex_areas * trust) + length**2 * stiffness))
@@ -49,7 +47,7 @@ def smooth_rotations(
 
 def turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: float, rounds: int = 3) -> Floats:
     """Return `rest` with its surroundings turned as in `places`, as far as these are trusted, and its own lengths."""
-    stiffness, areas = laplacian(rest), rest.vertex_areas * trust
+    stiffness, areas = _stiffness(rest), rest.vertex_areas * trust
     i, j = rest.edges.T
     weight = -np.asarray(stiffness[i, j]).ravel()
     side = rest.vertices[i] - rest.vertices[j]
@@ -61,6 +59,17 @@ def turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: float
         wanted = weight[:, None] * np.einsum("eij,ej->ei", (turn[i] + turn[j]) / 2, side)
         now = solve(_summed(i, wanted, len(now)) - _summed(j, wanted, len(now)) + areas[:, None] * places)
     return now
+
+
+def _stiffness(mesh: TriangleMesh) -> csr_array:
+    """Return the cotangent Laplacian, (n, n), without its negative weights.
+
+    Across an edge between two obtuse angles these push apart what should be turned alike.
+    """
+    stiffness = laplacian(mesh)
+    links = stiffness - diags_array(stiffness.diagonal())
+    links = csr_array(links.minimum(0))
+    return csr_array(links - diags_array(np.asarray(links.sum(axis=1)).ravel()))
 
 
 def coarsely_bent(flat: TriangleMesh, places: Floats, trust: Floats) -> Floats:
@@ -80,21 +89,3 @@ def _summed(index: Integers, values: Floats, count: int) -> Floats:
     flat = values.reshape(len(index), -1)
     sums = np.stack([np.bincount(index, column, count) for column in flat.T], axis=1)
     return sums.reshape(count, *values.shape[1:]).astype(np.float64, copy=False)
-
-
-def following(
-    nodes: Integers, rest: TriangleMesh, now: Floats, disc: Complexes, unbent: Floats, vertices: Integers
-) -> Floats:
-    """Return where vertices, (q,), go when the nodes move from `rest` to `now`: each with its triangle's surroundings.
-
-    Embedded deformation (Sumner et al. 2007): the mean, by barycentric coordinates in the disc, of what the three nodes
-    around would do with it.
-    """
-    faces = rest.faces
-    if signed_areas(disc[nodes], faces[:1])[0] < 0:
-        faces = faces[:, [0, 2, 1]]
-    face, barycentric = TriangulatedDisc.of(disc[nodes], faces).locate(disc[vertices])
-    corners = faces[face]
-    turn = smooth_rotations(rest, now)[corners]
-    from_node = unbent[vertices][:, None] - rest.vertices[corners]
-    return np.einsum("qk,qkd->qd", barycentric, now[corners] + np.einsum("qkij,qkj->qki", turn, from_node))

@@ -10,14 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 
 from .cholesky import factorised
-from .laplacian import laplacian, mass
+from .intrinsic_delaunay import IntrinsicTriangulation, intrinsic_delaunay, non_negative_laplacian
+from .laplacian import mollified_lengths
 from .mesh import Floats, TriangleMesh
 
 DIFFUSION_TIMES = (0.0005, 0.002, 0.008, 0.03)
 """Diffusion times as fractions of the surface's area: from a fiftieth to a sixth of its width in standard deviation."""
+
+
+LEAST_SHARE = 1e-6
+"""Share of what is diffused, against the largest, below which a place is too far from all vertices inside."""
 
 
 def diffused_curvatures(
@@ -28,16 +33,19 @@ def diffused_curvatures(
     """Return mean and Gauss curvature after diffusion, (n, 2 len(times)), times the root of the area.
 
     First the mean curvature of the diffused surface at each time: positions are diffused by one implicit step of
-    (M + t A L) x_t = M x, as in Desbrun et al. (1999); mean curvature is L x_t / (2 M) along the normal, positive where
-    the surface is convex. Then, at each time, the diffused Gauss curvature of the surface itself: the mean, by the same
-    step, of the angles that are missing around the vertices inside, as its signed root, to be a curvature too. 0 at
-    vertices in no face. `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
+    (M + t A L) x_t = M x, as in Desbrun et al. (1999), on the intrinsic Delaunay triangulation; mean curvature is
+    L x_t / (2 M) along the normal, positive where the surface is convex. Then, at each time, the diffused Gauss
+    curvature of the surface itself: the mean, by the same step, of the angles that are missing around the vertices
+    inside, as its signed root, to be a curvature too. 0 at vertices in no face. `progress` is called with the share of
+    the work done, in [0, 1], and may raise to end it.
     """
     area = mesh.area
-    stiffness, masses = laplacian(mesh), mesh.vertex_areas
+    sides = mollified_lengths(mesh.edge_lengths)
+    surface = intrinsic_delaunay(IntrinsicTriangulation(mesh.faces, sides, mesh.twins, len(mesh.vertices)))
+    stiffness, masses = non_negative_laplacian(surface), surface.vertex_areas
     used = np.unique(mesh.faces)
     inner = csc_array(stiffness[used][:, used])
-    weights = csc_array(mass(mesh))[used][:, used]
+    weights = csc_array(diags_array(masses[used]))
     missing, inside = _missing_angles(mesh)
     right = np.column_stack([weights @ mesh.vertices[used], missing[used], (masses * inside)[used]])
     result = np.zeros((len(mesh.vertices), 2 * len(times)))
@@ -50,8 +58,10 @@ def diffused_curvatures(
         normals = TriangleMesh(diffused, mesh.faces).vertex_normals()[used]
         vector = inner @ solved[:, :3]
         result[used, k] = (vector * normals).sum(axis=1) / (2 * masses[used]) * np.sqrt(area)
-        # the second is the share of what was diffused here that comes from inside: no angle is missing at the boundary
-        gauss = solved[:, 3] * area / np.maximum(solved[:, 4], np.finfo(float).tiny)
+        # the second is the share of what was diffused here that comes from inside: no angle is missing at the boundary,
+        # and where hardly anything comes from inside nothing is known of it
+        share = np.maximum(solved[:, 4], LEAST_SHARE * solved[:, 4].max())
+        gauss = solved[:, 3] * area / np.maximum(share, np.finfo(float).tiny)
         result[used, len(times) + k] = np.sign(gauss) * np.sqrt(np.abs(gauss))
     return result
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from .laplacian import cotangents
 from .mesh import Booleans, Floats, Integers
@@ -77,6 +78,23 @@ def intrinsic_delaunay(start: IntrinsicTriangulation, tolerance: float = 1e-10) 
         around = around[twins[around] >= 0]
         sides = np.unique(np.minimum(around, twins[around]))
     return IntrinsicTriangulation(faces, lengths, twins, start.vertex_count)
+
+
+def non_negative_laplacian(surface: IntrinsicTriangulation) -> csr_array:
+    """Return the Laplacian of an intrinsic Delaunay triangulation, (n, n), no weight of which is negative.
+
+    That of an edge on the boundary, which has one angle opposite, is 0 where that is obtuse. Diffusion by it is a mean:
+    what comes out lies between the least and the largest of what went in.
+    """
+    sides = np.flatnonzero(surface.twins < np.arange(len(surface.twins)))
+    half = 0.5 * cotangents(surface.lengths).ravel()
+    weight = np.maximum(half[sides] + np.where(surface.twins[sides] >= 0, half[surface.twins[sides]], 0), 0)
+    face, k = np.divmod(sides, 3)
+    i, j = surface.faces[face, (k + 1) % 3], surface.faces[face, (k + 2) % 3]
+    rows, columns = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
+    values = np.concatenate([-weight, -weight, weight, weight])
+    size = surface.vertex_count
+    return csr_array(coo_array((values, (rows, columns)), shape=(size, size)))
 
 
 def without_chords(

@@ -18,7 +18,8 @@ from scipy.special import expit
 from solver import Alignment, AlignSettings, align
 from solver.align.confidence import BOUND, COLUMNS
 
-from .correspondence.pairs import SETS, Pair
+from .correspondence.pairs import Pair
+from .correspondence.sets import SETS
 from .correspondence.store import Store, code
 
 BINS = 10

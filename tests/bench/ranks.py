@@ -19,7 +19,8 @@ from solver.surface.descriptors import diffused_curvatures
 from solver.surface.sampling import farthest_points
 from solver.surface.statistics import standardised
 
-from .correspondence.pairs import SETS, Pair
+from .correspondence.pairs import Pair
+from .correspondence.sets import SETS
 from .correspondence.store import Store
 
 ENDS = np.array([0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1])

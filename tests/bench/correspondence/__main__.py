@@ -25,8 +25,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from . import ours, tools
-from .pairs import SETS, Pair
+from .pairs import Pair
 from .score import Map, score
+from .sets import SETS
 from .store import Store
 from .tables import Row, folds, medians, seconds, targets
 

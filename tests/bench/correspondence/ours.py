@@ -26,7 +26,14 @@ def stages(pair: Pair, wanted: list[str], store: Store) -> dict[str, Map]:
     if not any(name in wanted for name in STAGES):
         return {}
     # the dense stage is the slow one: without it the others are found without it, and do not change with its code
-    refine, left_out = ("dense", ()) if "dense" in wanted else ("mobius", ("nonrigid", "surface_points", "overlap"))
+    refine, left_out = (
+        ("dense", ())
+        if "dense" in wanted
+        else (
+            "mobius",
+            ("bend", "plate", "pose", "rotations", "unfold", "nearest", "overlap", "pieces", "dense", "reconsider"),
+        )
+    )
     key = f"{pair.kind} {refine} {pair.digest} {code('report', 'baselines', *left_out)}"
     kept = store.kept(key, lambda: _aligned(pair, refine))
     return {name: _unpacked(kept, name) for name in STAGES if name in wanted}

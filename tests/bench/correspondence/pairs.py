@@ -273,7 +273,7 @@ HARD_TEETH = (("x07", "x17"), ("U02", "U08"), ("x02", "x17"), ("x17", "T14"))
 BRAIN = (("left", "right"),)
 
 
-def _of(
+def of_kind(
     kind: str,
     names: tuple[tuple[str, str], ...],
     shape: Callable[[str], Shape],
@@ -292,7 +292,7 @@ def _of(
     return made
 
 
-def _bent(store: Store, count: int | None) -> Iterator[Pair]:
+def bent(store: Store, count: int | None) -> Iterator[Pair]:
     pieces = list(bent_pieces(store))[:count]
     for k, (rest, bent) in enumerate(pieces):
         yield pair("bent", Shape(rest), Shape(bent), True, 2 * k, store)
@@ -317,7 +317,7 @@ CROPPED_SHARE = 0.3
 """Share of its area that each of them lacks."""
 
 
-def _partial(store: Store, count: int | None) -> Iterator[Pair]:
+def partial(store: Store, count: int | None) -> Iterator[Pair]:
     """Yield pairs of which first the source, then the target is cut short."""
     for k, (shape, a, b, direction, share) in enumerate(PARTIAL[:count]):
         source, target = shape(a), shape(b)
@@ -326,7 +326,7 @@ def _partial(store: Store, count: int | None) -> Iterator[Pair]:
         yield pair("partial", target, source, True, 2 * k + 1, store, target_part=cut)
 
 
-def _cropped(store: Store, count: int | None) -> Iterator[Pair]:
+def cropped(store: Store, count: int | None) -> Iterator[Pair]:
     """Yield pairs of faces of which each is cut short on a side of its own, chosen at random."""
     if reason := absent("faces_ict/ict_ground_truth.json") or absent("faces_simpop/SIMPOP_01.obj"):
         print(f"cropped skipped: {reason}")
@@ -344,7 +344,7 @@ def _cropped(store: Store, count: int | None) -> Iterator[Pair]:
         yield pair("cropped", source, target, True, k, store, source_part=parts[0], target_part=parts[1])
 
 
-def _one_open(store: Store, count: int | None) -> Iterator[Pair]:
+def one_open(store: Store, count: int | None) -> Iterator[Pair]:
     """Yield pairs of faces of which first the source alone, then the target alone has its mouth and eyes open."""
     if reason := absent("faces_ict/ict_ground_truth.json"):
         print(f"one-open skipped: {reason}")
@@ -362,20 +362,3 @@ def _cut(mesh: TriangleMesh, direction: np.ndarray, share: float) -> TriangleMes
     stays = np.ones(len(height), bool)
     stays[order[np.cumsum(mesh.face_areas[order]) < share * mesh.area]] = False
     return piece(mesh, stays, f"{mesh.name} less {100 * share:.0f} %")
-
-
-SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
-    "simpop": _of("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
-    "ict": _of("ict", ICT, ict, True, "faces_ict/ict_ground_truth.json"),
-    "simpop-moved": _of("simpop-moved", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj", True),
-    "ict-moved": _of("ict-moved", ICT, ict, True, "faces_ict/ict_ground_truth.json", True),
-    "ict-open": _of("ict-open", ICT, ict_open, True, "faces_ict/ict_ground_truth.json"),
-    "one-open": _one_open,
-    "teeth": _of("teeth", TEETH, tooth, False, "teeth/landmarks.json"),
-    "hard-teeth": _of("hard-teeth", HARD_TEETH, tooth, False, "teeth/landmarks.json"),
-    "brain": _of("brain", BRAIN, brain, True, "brain/conte69_L_cortex.obj"),
-    "bent": _bent,
-    "partial": _partial,
-    "cropped": _cropped,
-}
-"""Each set by its name: pairs in both directions, of the first `count` if given."""

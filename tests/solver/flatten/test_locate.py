@@ -70,3 +70,17 @@ def test_neighbours_share_the_side_opposite_the_corner():
         assert set(np.delete(faces[f], k)) < set(faces[neighbours[f, k]])
     boundary = (neighbours < 0).sum()
     assert boundary == 30  # the outermost of five rings
+
+
+def test_a_place_is_the_same_to_the_last_bit_whatever_lies_beside_it_in_memory():
+    rng = np.random.default_rng(3)
+    points = rings(20, jitter=0.4, seed=3)
+    faces = planar(points).faces
+    queries = 0.9 * np.sqrt(rng.random(200)) * np.exp(2j * np.pi * rng.random(200))
+    disc = TriangulatedDisc.of(points, faces)
+    first = disc.locate(queries)
+    for _ in range(300):
+        _held = [np.empty(size, np.uint8) for size in rng.integers(1, 20_000, 20)]
+        face, barycentric = disc.locate(queries.copy())
+        assert (face == first[0]).all()
+        assert barycentric.tobytes() == first[1].tobytes()

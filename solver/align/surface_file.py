@@ -1,0 +1,130 @@
+"""Prepared surfaces on disk: one .npz of plain arrays, checked when it is read."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from ..flatten.flatten import Flattening
+from ..surface.cleaning import Cleaned
+from ..surface.mesh import MeshError, TriangleMesh
+from .prepared import Surface
+
+_KIND = "mobius surface 1"
+"""What the file is, and of which version: another layout gets another number."""
+
+
+def save_surface(path: Path | str, surface: Surface) -> None:
+    """Write a surface with all that has been computed of it, and its flattening in any case.
+
+    Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came; kept (k,) int,
+    reversed (k,) bool and changes, text, of the faces put in order; fill_holes, largest_part, outer_vertex (-1: none);
+    disc (n,) complex; boundary, holes one after another and hole_sizes; flips_repaired; descriptors (n, d); and
+    source_COUNT and target_COUNT, the points chosen for each count.
+    """
+    tidy, flat = surface.cleaned, surface.flattening
+    chosen = {f"{role}_{count}": points for role, counts in surface.points.items() for count, points in counts.items()}
+    with Path(path).open("wb") as file:
+        np.savez_compressed(
+            file,
+            kind=_KIND,
+            fingerprint=surface.original.fingerprint,
+            name=surface.original.name,
+            vertices=surface.original.vertices,
+            faces=surface.original.faces,
+            kept=tidy.faces,
+            reversed=tidy.reversed,
+            changes=np.array(tidy.changes, dtype=str),
+            fill_holes=surface.fill_holes,
+            largest_part=surface.largest_part,
+            outer_vertex=-1 if surface.outer_vertex is None else surface.outer_vertex,
+            disc=flat.disc,
+            boundary=flat.boundary,
+            holes=np.concatenate([np.empty(0, np.intp), *flat.holes]),
+            hole_sizes=np.array([len(loop) for loop in flat.holes], np.intp),
+            flips_repaired=flat.flips_repaired,
+            **({} if surface.measured is None else {"descriptors": surface.measured}),
+            **chosen,
+        )
+
+
+def load_surface(path: Path | str) -> Surface:
+    """Read a surface that `save_surface` wrote.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ValueError
+        It is not such a file, is damaged, or its arrays do not fit each other.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as file:
+            stored = {name: file[name] for name in file.files}
+        if str(stored["kind"]) != _KIND:
+            raise ValueError(f"of another kind: {stored['kind']}")
+        return _checked(stored)
+    except (KeyError, ValueError, TypeError, IndexError, EOFError, zipfile.BadZipFile, zlib.error, MeshError) as error:
+        raise ValueError(f"'{path}' is no prepared surface of this version, or is damaged ({error})") from error
+
+
+def _checked(stored: dict[str, np.ndarray]) -> Surface:
+    """Return the surface of a file's arrays; raises one of several errors where they do not fit."""
+    original = TriangleMesh(stored["vertices"], stored["faces"], str(stored["name"]))
+    _require(original.fingerprint == str(stored["fingerprint"]), "the mesh is not the one that was prepared")
+    size, count = len(original.vertices), len(original.faces)
+    outer = int(stored["outer_vertex"])
+    surface = Surface(
+        original,
+        fill_holes=bool(stored["fill_holes"]),
+        outer_vertex=None if outer < 0 else outer,
+        largest_part=bool(stored["largest_part"]),
+    )
+    kept, turned = _indices(stored["kept"], count), stored["reversed"]
+    _require(turned.dtype == bool and turned.shape == kept.shape, "faces put in order")
+    changes = tuple(str(change) for change in stored["changes"])
+    mesh = original
+    if changes:
+        faces = original.faces[kept]
+        faces[turned] = faces[turned][:, [0, 2, 1]]
+        mesh = TriangleMesh(original.vertices, faces, original.name)
+    else:
+        _require(len(kept) == count and not turned.any(), "faces put in order")
+    disc = stored["disc"].astype(np.complex128, casting="safe")
+    _require(disc.shape == (size,) and (np.isfinite(disc) == mesh.used).all(), "the disc")
+    _require(bool((np.abs(disc[mesh.used]) <= 1 + 1e-12).all()), "the disc")
+    ends = np.cumsum(stored["hole_sizes"].astype(np.intp, casting="safe"))
+    holes = _indices(stored["holes"], size)
+    _require(len(holes) == (ends[-1] if len(ends) else 0), "openings")
+    flat = Flattening(
+        mesh,
+        disc,
+        _indices(stored["boundary"], size),
+        tuple(np.split(holes, ends[:-1])) if len(ends) else (),
+        int(stored["flips_repaired"]),
+    )
+    surface.known(Cleaned(mesh, kept, turned, changes, original.faces), flat)
+    if "descriptors" in stored:
+        surface.measured = stored["descriptors"].astype(np.float64, casting="safe")
+        _require(len(surface.measured) == size and surface.measured.ndim == 2, "descriptors")
+        _require(bool(np.isfinite(surface.measured).all()), "descriptors")
+    for role, counts in surface.points.items():
+        for name in stored:
+            if name.startswith(f"{role}_") and name.removeprefix(f"{role}_").isdecimal():
+                counts[int(name.removeprefix(f"{role}_"))] = _indices(stored[name], size)
+    return surface
+
+
+def _indices(values: np.ndarray, size: int) -> np.ndarray:
+    """Return whole numbers, (k,), each at least 0 and below `size`."""
+    result = values.astype(np.intp, casting="safe")
+    _require(result.ndim == 1 and bool(((result >= 0) & (result < size)).all()), "numbers of vertices or faces")
+    return result
+
+
+def _require(fits: bool, what: str) -> None:
+    if not fits:
+        raise ValueError(f"what does not fit: {what}")
