@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     new_scene()
     source, target = import_pair(options)
     surfaces = read_pair(options, source, target)
-    alignment, correspondence = align_pair(options, surfaces, settings)
+    alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
     with outputs() as written:
         if options.map:
             save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))

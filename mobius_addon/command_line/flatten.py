@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
 
     require_writable(meshes=[options.output], others=[options.report])
     new_scene()
-    obj = import_mesh(options.mesh).obj
+    obj = import_mesh(options.mesh, writes=True).obj
     surface = read_surface(obj, options.mesh)
     shown = measure(options.distortion, DISC_MEASURES) if options.distortion else None
     require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])

@@ -15,14 +15,16 @@ if TYPE_CHECKING:
     from ..mesh_data import Surface
 
 
-def import_pair(options: argparse.Namespace) -> tuple[Imported, Imported]:
-    """Return source and target."""
+def import_pair(options: argparse.Namespace, *, writes_target: bool = False) -> tuple[Imported, Imported]:
+    """Return source and target; `writes_target` tells whether the target will be changed."""
     from ..files import import_mesh
     from ..mesh_data import Refusal
 
     if _same_mesh(options.source, options.target):
         raise Refusal(f"'{options.source}' is both source and target: give two meshes")
-    target = import_mesh(options.target)  # first, so that its materials and images keep their names
+    target = import_mesh(
+        options.target, writes=writes_target
+    )  # first, so that its materials and images keep their names
     return import_mesh(options.source), target
 
 
@@ -37,16 +39,19 @@ def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -
 
 
 def align_pair(
-    options: argparse.Namespace, surfaces: tuple[Surface, Surface], settings: AlignSettings
+    options: argparse.Namespace,
+    files: tuple[Imported, Imported],
+    surfaces: tuple[Surface, Surface],
+    settings: AlignSettings,
 ) -> tuple[Alignment, Correspondence]:
-    """Align two surfaces and say what was found."""
+    """Align two surfaces, which were read from these files, and say what was found."""
     from ..computation import aligned
     from ..operators.align import summary
 
     source, target = surfaces
     require_outer(settings.source_outer, options, "--source-outer", source)
     require_outer(settings.target_outer, options, "--target-outer", target)
-    pairs = _landmarks(options, (source.mesh, target.mesh))
+    pairs = _landmarks(options, files, (source.mesh, target.mesh))
     alignment, correspondence = aligned(
         source.mesh, target.mesh, settings, largest_part=options.largest_part, landmarks=pairs
     )
@@ -57,17 +62,18 @@ def align_pair(
     return alignment, correspondence
 
 
-def _landmarks(options: argparse.Namespace, meshes: tuple[TriangleMesh, TriangleMesh]) -> Integers | None:
-    """Return the pairs of the file that was given, if any."""
-    from ..files import Unreadable
-    from ..landmarks import from_file
+def _landmarks(
+    options: argparse.Namespace, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]
+) -> Integers | None:
+    """Return the pairs of the file that was given, if any, and say what is left out."""
+    from ..files import read_landmarks
 
     if options.landmarks is None:
         return None
-    try:
-        return from_file(options.landmarks, meshes)
-    except OSError as error:
-        raise Unreadable(f"'{options.landmarks}' cannot be read: {error.strerror}") from error
+    pairs, warnings = read_landmarks(options.landmarks, files, meshes)
+    for warning in warnings:
+        say_error(f"mobius: warning: {warning}")
+    return pairs
 
 
 def _same_mesh(source: str, target: str) -> bool:

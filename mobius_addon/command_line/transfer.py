@@ -76,13 +76,13 @@ def _transfer_to(options: argparse.Namespace) -> None:
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
     require_writable(meshes=[options.output], others=[options.map, options.report])
     new_scene()
-    source, target = import_pair(options)
+    source, target = import_pair(options, writes_target=True)
     surfaces = read_pair(options, source, target)
     alignment = None
     if options.use_map:
         correspondence = _fitting_map(load_map, options, surfaces)
     else:
-        alignment, correspondence = align_pair(options, surfaces, settings)
+        alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
     plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
     plan.write(target.obj)
     if options.output.suffix.lower() != ".blend":  # others carry it as a property that is of no use there

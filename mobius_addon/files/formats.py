@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +13,9 @@ import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
 
 from ..attributes import KINDS
-from ..mesh_data import Refusal
+from . import blend, gifti, off, vtk
 from .joining import join_along_seams, join_coinciding
-
-
-class Unreadable(Refusal):
-    """A file is missing, of an unknown kind or damaged, or does not hold the one mesh that is needed."""
+from .unreadable import Unreadable
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,8 @@ class Format:
     Parameters
     ----------
     importer, exporter : callable
-        Read a path into the scene; write the selected objects to a path.
+        Read a path into the scene; write the selected objects to a path. An importer may return the list of objects
+        that the file has; otherwise they are those that are new.
     keeps : frozenset of str
         The kinds of `attributes.KINDS` that such a file can hold.
     join : callable
@@ -48,13 +48,6 @@ def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
     return operator
 
 
-def _load_blend(path: str) -> None:
-    with bpy.data.libraries.load(path) as (stored, wanted):
-        wanted.objects = stored.objects
-    for obj in wanted.objects:
-        bpy.context.scene.collection.objects.link(obj)
-
-
 def _save_blend(path: str) -> None:
     for obj in set(bpy.data.objects) - set(bpy.context.selected_objects):
         bpy.data.objects.remove(obj)
@@ -67,7 +60,7 @@ def _save_gltf(path: str) -> None:
     _operator("export_scene.gltf", "io_scene_gltf2")(filepath=path, use_selection=True, export_format=form)
 
 
-_BLEND = Format(_load_blend, _save_blend, frozenset(kind.identifier for kind in KINDS))
+_BLEND = Format(blend.read, _save_blend, frozenset(kind.identifier for kind in KINDS))
 _OBJ = Format(
     lambda path: bpy.ops.wm.obj_import(filepath=path),
     lambda path: bpy.ops.wm.obj_export(
@@ -121,37 +114,77 @@ FORMATS = {
 }
 
 
+@dataclass(frozen=True)
+class ReadOnly:
+    """A kind of file that is read and not written; see `Format`."""
+
+    importer: Callable[[str], object]
+    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
+
+
+READ_ONLY = {
+    ".vrm": ReadOnly(_GLTF.importer, _GLTF.join),  # a .glb with an avatar's rig described in it
+    ".usdz": ReadOnly(_USD.importer),
+    ".off": ReadOnly(off.read),
+    ".vtk": ReadOnly(vtk.read),
+    ".gii": ReadOnly(gifti.read),
+}
+
+_OBJECT = re.compile(f"({'|'.join(map(re.escape, [*FORMATS, *READ_ONLY]))})(?P<colon>:)", re.IGNORECASE)
+"""Where in FILE:Object the file ends."""
+
+
 def split_object_name(argument: str) -> tuple[Path, str | None]:
     """Split FILE:Object into the file and the object's name; a file without a name gives None.
 
-    >>> split_object_name("scans.blend:Scan.003")
-    (PosixPath('scans.blend'), 'Scan.003')
+    >>> split_object_name("scans.BLEND:Scan.003")
+    (PosixPath('scans.BLEND'), 'Scan.003')
     """
-    if Path(argument).exists():
-        return Path(argument), None
-    for ending in FORMATS:
-        before, found, name = argument.rpartition(f"{ending}:")
-        if found and name:
-            return Path(before + ending), name
+    if not os.path.lexists(argument):
+        for found in _OBJECT.finditer(argument):
+            before, name = argument[: found.start("colon")], argument[found.end("colon") :]
+            if name:
+                return Path(before), name
     return Path(argument), None
 
 
 def format_of(path: Path) -> Format:
-    """Return the format that a path's ending names.
+    """Return the format that the ending of a file to be written names.
+
+    Raises
+    ------
+    Unreadable
+        No such ending, or one of files that are only read.
+    """
+    found = FORMATS.get(path.suffix.lower())
+    if found is None and path.suffix.lower() in READ_ONLY:
+        raise Unreadable(f"'{path}': {path.suffix} files are read, but not written: use one of {' '.join(FORMATS)}")
+    if found is None:
+        raise Unreadable(f"'{path}' has an ending that is not known: use one of {' '.join(FORMATS)}")
+    return found
+
+
+def reader_of(path: Path) -> Format | ReadOnly:
+    """Return what reads a file with a path's ending.
 
     Raises
     ------
     Unreadable
         No such ending.
     """
-    found = FORMATS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    found = FORMATS.get(ending) or READ_ONLY.get(ending)
     if found is None:
-        known = " ".join(FORMATS)
+        known = " ".join([*FORMATS, *READ_ONLY])
         raise Unreadable(f"'{path}' has an ending that is not known: use one of {known}")
     return found
 
 
 def first_message(error: Exception) -> str:
-    """Return the first message of an importer's error."""
-    first = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
-    return first.removeprefix("Error:").strip()
+    """Return the first message of an importer's error; of a traceback that Blender passes on, what it ends with."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    if any("Traceback (most recent call last)" in line for line in lines):
+        # Blender adds where its own operator was called
+        named = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Exit)\b", line)]
+        lines = [f"it does not hold what its kind of file does ({named[-1] if named else lines[-1]})"]
+    return (lines or [type(error).__name__])[0].removeprefix("Error:").strip()
