@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.util
 import os
@@ -33,7 +34,8 @@ def main() -> int:
     try:
         if sys.argv[1:2] == ["build"]:
             return importlib.import_module(f"{PACKAGE}.release.build").main(sys.argv[2:])
-        return importlib.import_module(f"{PACKAGE}.mobius_addon.command_line").main_quietly(sys.argv[1:])
+        command_line = importlib.import_module(f"{PACKAGE}.mobius_addon.command_line")
+        return command_line.guarded(lambda: command_line.main_quietly(sys.argv[1:]))
     except ImportError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in ("bpy", "numpy", "scipy"):
@@ -50,8 +52,10 @@ def leave(status: int) -> None:
 
     Blender's module, once loaded, sometimes waits for its own threads for ever in the C library's exit handlers.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        # closed, or its reader has gone
+        with contextlib.suppress(AttributeError, OSError):
+            stream.flush()
     if "bpy" in sys.modules and (folder := sys.modules["bpy"].app.tempdir):
         shutil.rmtree(folder, ignore_errors=True)
     os._exit(status)

@@ -8,11 +8,14 @@ from importlib import import_module
 # in the order in which they register; each has `register` and `unregister`
 _TOOLS = (
     "edits",
+    "fingerprints",
     "topology_cache",
     "kept_surfaces",
     "overlay",
     "preferences",
     "properties",
+    "earlier_version",
+    "deleted",
     "jobs",
     "operators",
     "preset_menus",

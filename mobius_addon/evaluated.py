@@ -14,7 +14,7 @@ from ..solver import Correspondence, TriangleMesh
 from ..solver.align.confidence import BOUND
 from ..solver.surface.mesh import Floats, Integers
 from ..solver.surface.nearest import SurfacePoints
-from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface
+from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface, seen_positions
 
 _TRACE = "mobius_trace"
 """An attribute that modifiers carry along with the mesh: x, y, z of the original, and 1 to know it from what is new."""
@@ -105,7 +105,7 @@ def evaluated(obj: bpy.types.Object, original: Surface) -> Iterator[Shown]:
             # in the triangles of the original, which Blender may cut otherwise there
             vertices = read_surface(lent).mesh.vertices
             mesh = TriangleMesh(vertices, original.mesh.faces, original.mesh.name)
-            yield Shown(lent, replace(original, mesh=mesh), None)
+            yield Shown(lent, replace(original, mesh=mesh, rest=mesh), None)
             return
     with _traced(obj) as twin:
         graph = bpy.context.evaluated_depsgraph_get()
@@ -147,7 +147,7 @@ def _traced(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
             mesh.attributes.remove(mesh.attributes[_TRACE])
         trace = mesh.attributes.new(_TRACE, "FLOAT_COLOR", "POINT")
         places = np.ones((len(mesh.vertices), 4), np.float32)
-        places[:, :3] = foreach(mesh.vertices, "co", 3, np.float32)
+        places[:, :3] = seen_positions(obj)
         trace.data.foreach_set("color", places.ravel())
         bpy.context.scene.collection.objects.link(twin)
         bpy.context.view_layer.update()

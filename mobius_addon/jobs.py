@@ -6,6 +6,10 @@ operator goes on as a modal one with a timer. Results are written once, at the e
 ESC ends the operator at once. The thread is told to stop, which it does when the solver next says how far it is: within
 a fraction of a second mostly, up to some seconds in a long factorisation. Nobody waits for it, and nobody takes its
 result.
+
+The window stays usable meanwhile: mode, scene, workspace and names may be others when the work is done. The result
+waits until it can be written, and objects are told by Blender's number of the session, which undo and renaming leave
+alone.
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..solver import Cancelled, MeshError, Progress
 from .mesh_data import Refusal
 from .registration import register_factory
+from .usable import by_uid, why_not_now
 
 Report = Callable[[Progress], bool | None]
 Work = Callable[[Report], Any]
@@ -39,6 +44,15 @@ class Job:
         Called with a progress callback; may touch arrays only, never bpy.
     title : str
         What it is, for the status bar.
+
+    Attributes
+    ----------
+    waits : str or None
+        What the finished result waits for before it is written.
+    told : int or None
+        Number of the workspace whose status bar speaks of it.
+    timer : bpy.types.Timer or None
+        What wakes its operator in the window.
     """
 
     current: ClassVar[Job | None] = None
@@ -47,6 +61,9 @@ class Job:
     def __init__(self, work: Work, title: str = "") -> None:
         self.title = title
         self.progress = Progress(n_("Starting"), 0.0)
+        self.waits: str | None = None
+        self.told: int | None = None
+        self.timer: Any = None
         self.result: Any = None
         self.error: BaseException | None = None
         self._work = work
@@ -96,13 +113,17 @@ def why_busy() -> str | None:
 class JobOperator:
     """Mixin for operators whose work is long. Subclasses say what to compute and what to write.
 
-    The window stays usable meanwhile, so `finish` has to look its objects up again and make sure that they are what
-    `prepare` read.
+    The window stays usable meanwhile, so `finish` has to look its objects up again, by their numbers in `objects_read`,
+    and make sure that they are what `prepare` read.
     """
 
     job_title: ClassVar[str]
+    bl_idname: ClassVar[str]
     options: Any
+    properties: Any
     report: Callable[[set[str], str], None]
+    objects_read: tuple[int, ...] = ()
+    _scene: int | None = None
 
     def prepare(self, context: bpy.types.Context) -> Work:
         """Read everything the work needs into arrays and return the work. May raise `Refusal` or `MeshError`."""
@@ -113,16 +134,21 @@ class JobOperator:
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Do the work: at once for a script, in the background for a person."""
+        """Do the work: at once for a script and for the redo panel, in the background for a person."""
+        self._scene = context.scene.session_uid
+        in_window = not bpy.app.background and self.options.is_invoke
+        if in_window and self.options.is_repeat_last:
+            return self._invoke_anew()
         try:
             work = self.prepare(context)
         except (Refusal, MeshError) as error:
             return self._refused(error)
         manager = context.window_manager
-        if not bpy.app.background and self.options.is_invoke:
+        # a repeated operator belongs to Blender's list of those that are done: as a modal one it would be freed twice
+        if in_window and not self.options.is_repeat:
             self._job = Job.current = Job(work, self.job_title)
             self._shown: tuple[str, int] | None = None
-            self._timer = manager.event_timer_add(INTERVAL, window=context.window)
+            self._job.timer = manager.event_timer_add(INTERVAL, window=context.window)
             manager.modal_handler_add(self)
             redraw(context)
             return {"RUNNING_MODAL"}
@@ -150,7 +176,9 @@ class JobOperator:
             return self._stopped()
         if event.type != "TIMER":
             return {"RUNNING_MODAL", "PASS_THROUGH"}
-        if not self._job.done:
+        if self._job.done:
+            self._job.waits = self._why_wait(context) if self._job.error is None else None
+        if not self._job.done or self._job.waits:
             self._show(context, self._job.progress)
             return {"RUNNING_MODAL", "PASS_THROUGH"}
         self._close(context)
@@ -167,21 +195,42 @@ class JobOperator:
         self._job.cancel()
         self._close(context)
 
+    def _invoke_anew(self) -> set[str]:
+        """Answer Repeat Last, a new wish for what is chosen now, by an operator of its own, which may become modal."""
+        names = [prop.identifier for prop in self.properties.bl_rna.properties if prop.identifier != "rna_type"]
+        given = {name: getattr(self, name) for name in names if self.properties.is_property_set(name)}
+        name = self.bl_idname.partition("_OT_")[2]  # a registered class has it as Blender spells types
+        try:
+            getattr(bpy.ops.mobius, name)("INVOKE_DEFAULT", True, **given)
+        except RuntimeError as error:  # it was refused
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return {"CANCELLED"}
+
+    def _why_wait(self, context: bpy.types.Context) -> str | None:
+        """Return why the result cannot be written yet, or None if it can, or never will."""
+        scene = by_uid(bpy.data.scenes, self._scene)
+        if scene is not None and scene != context.scene:
+            return rpt_("the scene '{}' has to be shown").format(scene.name)
+        return why_not_now(context, [by_uid(bpy.data.objects, uid) for uid in self.objects_read])
+
     def _show(self, context: bpy.types.Context, progress: Progress) -> None:
         """Say in the status bar and the panel where the work is, if that is news."""
-        now = ": ".join(filter(None, (iface_(self.job_title), iface_(progress.stage), describe_proof(progress))))
+        stage = iface_("Waiting") if self._job.waits else iface_(progress.stage)
+        now = ": ".join(filter(None, (iface_(self.job_title), stage, self._job.waits or describe_proof(progress))))
         shown = now, round(100 * progress.fraction)
-        if shown != self._shown:
-            self._shown = shown
-            context.workspace.status_text_set(f"{now}   |   {iface_('ESC: Stop')}")
+        workspace = context.workspace
+        if shown != self._shown or workspace.session_uid != self._job.told:
+            if workspace.session_uid != self._job.told:  # the text belongs to a workspace, and another is shown now
+                clear_status(self._job)
+            self._shown, self._job.told = shown, workspace.session_uid
+            workspace.status_text_set(f"{now}   |   {iface_('ESC: Stop')}")
             redraw(context)
 
     def _close(self, context: bpy.types.Context) -> None:
-        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.event_timer_remove(self._job.timer)
         if Job.current is self._job:
             Job.current = None
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+        clear_status(self._job)
         redraw(context)
 
     def _refused(self, error: Exception) -> set[str]:
@@ -191,6 +240,13 @@ class JobOperator:
     def _stopped(self) -> set[str]:
         self.report({"INFO"}, rpt_("{} stopped: nothing was changed").format(rpt_(self.job_title)))
         return {"CANCELLED"}
+
+
+def clear_status(job: Job) -> None:
+    """Have the status bar say what it says by itself, in the workspace where it spoke of the job."""
+    if job.told is not None and (workspace := by_uid(bpy.data.workspaces, job.told)) is not None:
+        workspace.status_text_set(None)
+    job.told = None
 
 
 def redraw(context: bpy.types.Context, types: tuple[str, ...] = ("VIEW_3D",)) -> None:
@@ -234,5 +290,8 @@ def unregister() -> None:
     """Undo `register`, and stop the work under way: Blender quits or the extension is switched off."""
     if Job.current is not None:
         Job.current.cancel()
+        # Blender takes the operator away without a word to it
+        clear_status(Job.current)
+        bpy.context.window_manager.event_timer_remove(Job.current.timer)
         Job.current = None
     _unregister()

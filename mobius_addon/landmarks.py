@@ -1,9 +1,8 @@
-"""Pairs of points that the user knows: empties, vertex groups of one vertex, or a file."""
+"""Pairs of points that the user knows in a scene: empties, or vertex groups of one vertex."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -54,44 +53,6 @@ def from_scene(
             f"'{source.name}' and '{target.name}' have no {what} with equal names: add some, or turn landmarks off"
         )
     return np.array([[side[name] for side in named] for name in common], np.intp)
-
-
-def from_file(path: Path, meshes: tuple[TriangleMesh, TriangleMesh]) -> Integers:
-    """Return the (source vertex, target vertex) rows, (l, 2), of a text file.
-
-    Each line has two vertex numbers, or six coordinates: a point on the source and one on the target, each standing for
-    the nearest vertex. Commas, semicolons and spaces separate; what follows # is a remark.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    Refusal
-        It is no such file, or has no line.
-    """
-    rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
-        words = re.split(r"[,;\s]+", line.split("#")[0].strip())
-        if words == [""]:
-            continue
-        try:
-            values = [float(word) for word in words]
-        except ValueError:
-            values = []
-        if len(values) == 2 and all(value.is_integer() for value in values):
-            rows.append([int(value) for value in values])
-        elif len(values) == 6 and np.isfinite(values).all():
-            points = [np.array(values[:3]), np.array(values[3:])]
-            rows.append([_nearest(mesh, [at])[0] for mesh, at in zip(meshes, points, strict=True)])
-        else:
-            raise Refusal(f"'{path}', line {number}: give two vertex numbers, or a point of each mesh by x y z")
-    if not rows:
-        raise Refusal(f"'{path}' holds no landmarks: give a pair on each line")
-    pairs = np.array(rows, np.intp)
-    for column, mesh in zip(pairs.T, meshes, strict=True):
-        if column.min() < 0 or column.max() >= len(mesh.vertices):
-            raise Refusal(f"'{path}' names vertices that '{mesh.name}' lacks: it has 0 to {len(mesh.vertices) - 1:,}")
-    return pairs
 
 
 def _empties(obj: bpy.types.Object) -> dict[str, Floats]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +24,11 @@ class Surface:
     Attributes
     ----------
     mesh : TriangleMesh
-        Vertices in the object's own space and Blender's triangulation of the polygons. An object whose scale mirrors it
-        is mirrored here too (x negated, triangles turned round), so that left and right are what the person sees.
+        Vertices in the object's own space, as `seen_positions` has them, and Blender's triangulation of the polygons.
+        An object whose scale mirrors it is mirrored here too (x negated, triangles turned round), so that left and
+        right are what the person sees.
+    rest : TriangleMesh
+        The same in the shape that shape keys depart from; `mesh` itself unless a key is pinned.
     triangle_corners : (m, 3) int
         Index of the face corner (Blender's loop) at each corner of each triangle.
     corner_vertex : (c,) int
@@ -38,17 +40,11 @@ class Surface:
     """
 
     mesh: TriangleMesh
+    rest: TriangleMesh
     triangle_corners: Integers
     corner_vertex: Integers
     corner_polygon: Integers
     edges: Integers
-
-    def fingerprint(self) -> str:
-        """Return a hash of vertices and triangles, which any edit of the shape changes."""
-        digest = hashlib.blake2b(digest_size=16)
-        digest.update(self.mesh.vertices.astype(np.float32).tobytes())
-        digest.update(self.mesh.faces.astype(np.int32).tobytes())
-        return digest.hexdigest()
 
 
 def foreach(collection: Any, name: str, width: int, dtype: type[np.generic]) -> np.ndarray:
@@ -75,16 +71,43 @@ def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
     """
     mesh = obj.data
     mesh.calc_loop_triangles()
-    vertices = foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+    shapes = [rest_positions(mesh), seen_positions(obj)]
     corner_vertex = foreach(mesh.loops, "vertex_index", 1, np.int32)
     corners = foreach(mesh.loop_triangles, "loops", 3, np.int32)
     corner_polygon = np.repeat(np.arange(len(mesh.polygons)), foreach(mesh.polygons, "loop_total", 1, np.int32))
     if is_mirrored(obj):
-        vertices[:, 0] *= -1
+        for vertices in shapes:
+            vertices[:, 0] *= -1
         corners = corners[:, ::-1]
-    triangles = TriangleMesh(vertices, corner_vertex[corners], name or obj.name)
+    rest = seen = TriangleMesh(shapes[0], corner_vertex[corners], name or obj.name)
+    if (shapes[1] != shapes[0]).any():
+        seen = TriangleMesh(shapes[1], seen.faces, seen.name)
     edges = foreach(mesh.edges, "vertices", 2, np.int32).astype(np.intp)
-    return Surface(triangles, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon, edges)
+    return Surface(seen, rest, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon, edges)
+
+
+def rest_positions(mesh: bpy.types.Mesh) -> Floats:
+    """Return where Blender shows the vertices, (n, 3), with all shape keys at 0.
+
+    Those of the first key, where there are keys: what `mesh.vertices` says may be out of step with it.
+    """
+    keys = mesh.shape_keys
+    if keys is None or len(keys.reference_key.points) != len(mesh.vertices):
+        return foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+    return foreach(keys.reference_key.points, "co", 3, np.float32).astype(np.float64)
+
+
+def seen_positions(obj: bpy.types.Object) -> Floats:
+    """Return the vertices of an object, (n, 3), in its own space: at rest, or in the one shape that is pinned."""
+    places, key = rest_positions(obj.data), obj.active_shape_key
+    if key is None or not obj.show_only_shape_key or key.mute or len(key.points) != len(places):
+        return places
+    pinned = foreach(key.points, "co", 3, np.float32).astype(np.float64)
+    group = obj.vertex_groups.get(key.vertex_group)
+    if group is not None:
+        weight = [sum(x.weight for x in vertex.groups if x.group == group.index) for vertex in obj.data.vertices]
+        pinned = places + np.array(weight)[:, None] * (pinned - places)
+    return pinned
 
 
 def is_mirrored(obj: bpy.types.Object) -> bool:
@@ -95,6 +118,31 @@ def is_mirrored(obj: bpy.types.Object) -> bool:
 def mirrored(obj: bpy.types.Object, vectors: npt.NDArray[Any]) -> Floats:
     """Return vectors, (n, 3), between an object's own space and that of its `Surface`, either way."""
     return np.asarray(vectors * np.array([-1.0 if is_mirrored(obj) else 1.0, 1.0, 1.0]), dtype=np.float64)
+
+
+def unseen_warning(obj: bpy.types.Object) -> str | None:
+    """Return a sentence if an object looks other than what is read of it, by a scale or the sliders of its keys."""
+    return scale_warning(obj) or shape_warning(obj)
+
+
+def shape_warning(obj: bpy.types.Object) -> str | None:
+    """Return a sentence if shape keys show an object by more than 1 % of its diagonal off the shape that is read."""
+    keys, places = obj.data.shape_keys, rest_positions(obj.data)
+    if keys is None or obj.show_only_shape_key or not keys.use_relative:
+        return None
+    names, moved = [], np.zeros_like(places)
+    for key in keys.key_blocks:
+        if key != keys.reference_key and not key.mute and key.value and len(key.points) == len(places):
+            names.append(key.name)
+            apart = foreach(key.points, "co", 3, np.float32) - foreach(key.relative_key.points, "co", 3, np.float32)
+            moved += key.value * apart
+    if not names or not np.linalg.norm(moved, axis=1).max() > 0.01 * np.linalg.norm(np.ptp(places, axis=0)):
+        return None
+    shown = ", ".join(f"'{name}'" for name in names[:3]) + (", ..." if len(names) > 3 else "")
+    return (
+        f"'{obj.name}' counts in the shape of '{keys.reference_key.name}', without {shown}: "
+        "to align it in another one, pin that shape key"
+    )
 
 
 def scale_warning(obj: bpy.types.Object) -> str | None:

@@ -222,13 +222,15 @@ class TransferOptions(SourceMaskOptions):
     )
     collisions: bpy.props.EnumProperty(
         name="Same Name",
-        description="What happens to a layer of the target that has the name of one that is carried",
+        description="What happens to a layer of the target's own that has the name of one that is carried, where the "
+        "two differ. What an earlier transfer wrote is made anew unless it was edited since",
         items=(
-            ("replace", "Replace", "It takes the carried values"),
-            ("number", "Keep Both", "It stays, and the carried layer gets a number, as in 'Group.001'"),
+            ("replace", "Replace", "The carried layer takes its place"),
+            ("number", "Keep Both", "It stays, and the carried layer gets a number, as in 'UVMap.001'. What a mesh has "
+             "once, as materials and seams, is replaced"),
         ),
         default=_TRANSFER.collisions,
-    )
+    )  # fmt: skip
     mix: bpy.props.EnumProperty(
         name="Mix",
         description="How weights, shapes, colors, masks and other interpolated values join those that are there",

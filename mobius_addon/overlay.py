@@ -21,7 +21,7 @@ from ..solver.surface.mesh import Complexes, Floats
 from ..solver.surface.sampling import spread
 from . import edits, stored_alignment
 from .heat_maps import MAP_MEASURES, Measure, measure, shown_by, srgb
-from .mesh_data import Refusal, foreach, read_surface
+from .mesh_data import Refusal, foreach, read_surface, seen_positions
 from .results import read_layout
 
 LIFT = 0.003
@@ -64,7 +64,7 @@ def matches_of(source: bpy.types.Object, target: bpy.types.Object, count: int) -
     matched = np.flatnonzero(found.matched)
     if not len(matched):
         return None
-    there = foreach(target.data.vertices, "co", 3, np.float32).astype(np.float64)
+    there = seen_positions(target)
     chosen = matched[spread(there[matched], count)]
     confidence = measure("confidence", MAP_MEASURES)
     shares = confidence.shares(found, *(surface.mesh for surface in surfaces))
@@ -153,10 +153,9 @@ def _forget(edited: int | None) -> None:
 
 def _lifted(obj: bpy.types.Object) -> Floats:
     """Return the vertices of an object in its own space, (n, 3), a little above its surface."""
-    mesh = obj.data
-    places = foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+    places = seen_positions(obj)
     height = LIFT * np.linalg.norm(np.ptp(places, axis=0))
-    return places + height * foreach(mesh.vertex_normals, "vector", 3, np.float32)
+    return places + height * foreach(obj.data.vertex_normals, "vector", 3, np.float32)
 
 
 def _chosen_matches(context: bpy.types.Context) -> Matches | None:

@@ -14,6 +14,7 @@ from .heat_maps import MAP_MEASURES
 from .jobs import Job, MOBIUS_OT_stop, describe_proof
 from .operators.align import MOBIUS_OT_align
 from .operators.check import MOBIUS_OT_check
+from .operators.clear import MOBIUS_OT_clear
 from .operators.conformal_transfer import MOBIUS_OT_conformal_transfer
 from .operators.discs import MOBIUS_OT_show_discs
 from .operators.flatten import MOBIUS_OT_flatten
@@ -33,6 +34,7 @@ from .options import (
 )
 from .preferences import preferences
 from .preset_menus import MOBIUS_PT_align_presets, MOBIUS_PT_transfer_presets
+from .transfer_preview import draw_preview
 from .usable import why_not
 
 
@@ -140,6 +142,7 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
         for measure in MAP_MEASURES:
             row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
         layout.prop(view, "legend")
+        layout.operator(MOBIUS_OT_clear.bl_idname, icon="TRASH")
 
 
 class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
@@ -159,6 +162,7 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
             row = column.row()
             row.alignment = "LEFT"
             row.prop_enum(settings, "kinds", identifier, icon=icon)
+        draw_preview(layout, context)
         column = layout.column()
         column.scale_y = 1.4
         _hand_on(TRANSFER_OPTIONS, settings, column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER"))
@@ -205,6 +209,7 @@ class MOBIUS_PT_scans(MobiusSubPanel, bpy.types.Panel):
         row.prop(settings, "outer_loop")
         layout.prop(settings, "largest_part")
         _hand_on(SCAN_OPTIONS, settings, layout.operator(MOBIUS_OT_flatten.bl_idname, icon="UV"))
+        layout.operator(MOBIUS_OT_clear.bl_idname, text="Clear Selected", icon="TRASH").clear_from = "selected"
 
 
 class MOBIUS_PT_alignment(MobiusSubPanel, bpy.types.Panel):
@@ -266,9 +271,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
     """Draw how far the work under way is, and what it has proved."""
     row = layout.row(align=True)
-    row.progress(factor=job.progress.fraction, text=iface_(job.progress.stage))
+    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
     row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
-    layout.label(text=describe_proof(job.progress) or iface_("ESC stops"), translate=False)
+    layout.label(text=job.waits or describe_proof(job.progress) or iface_("ESC stops"), translate=False)
 
 
 def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:

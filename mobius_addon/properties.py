@@ -1,4 +1,8 @@
-"""What the extension keeps: choices in the scene, the last alignment on the target's mesh, what the overlay draws."""
+"""What the extension keeps.
+
+Choices in the scene; on a mesh its last alignment as target, and which layers were active before ours; what the overlay
+draws.
+"""
 
 # no postponed annotations here: Blender reads the properties from them
 import bpy
@@ -30,9 +34,15 @@ class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.Prope
 
 
 class MobiusAlignment(bpy.types.PropertyGroup):
-    """The last alignment of a mesh as target, as `stored_alignment` keeps it."""
+    """The last alignment of a mesh as target, as `stored_alignment` keeps it.
 
-    source: bpy.props.PointerProperty(type=bpy.types.Object)
+    The source is told by its name, its number of vertices and its fingerprint: a pointer would keep it in the file for
+    ever.
+    """
+
+    source: bpy.props.PointerProperty(type=bpy.types.Object)  # of version 0.1 only: see `earlier_version`
+    source_name: bpy.props.StringProperty()
+    source_size: bpy.props.IntProperty()
     source_fingerprint: bpy.props.StringProperty()
     target_fingerprint: bpy.props.StringProperty()
     value: bpy.props.FloatProperty()
@@ -101,12 +111,14 @@ def register() -> None:
     _register_classes()
     bpy.types.Scene.mobius = bpy.props.PointerProperty(type=MobiusSettings)
     bpy.types.Mesh.mobius_alignment = bpy.props.PointerProperty(type=MobiusAlignment)
+    bpy.types.Mesh.mobius_before = bpy.props.StringProperty()  # as `attributes.note` keeps it
     bpy.types.WindowManager.mobius_view = bpy.props.PointerProperty(type=MobiusView)
 
 
 def unregister() -> None:
     """Undo `register`."""
     del bpy.types.WindowManager.mobius_view
+    del bpy.types.Mesh.mobius_before
     del bpy.types.Mesh.mobius_alignment
     del bpy.types.Scene.mobius
     _unregister_classes()

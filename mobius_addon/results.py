@@ -1,4 +1,7 @@
-"""What flatten and align write on a mesh for people to see: UV layouts, colors and the group of matched points."""
+"""What flatten, align and show write on a mesh for people to see, and how it goes away again.
+
+UV layouts, colors and the group of matched points.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..solver.surface.mesh import Booleans, Complexes, Floats
-from .attributes import MAX_UV_MAPS, SHARED_LAYOUT, AttributeAccess, VertexGroupAccess
+from .attributes import (
+    DISC_LAYOUT,
+    MATCHED_GROUP,
+    MAX_UV_MAPS,
+    OWN_NAMES,
+    SHARED_LAYOUT,
+    AttributeAccess,
+    VertexGroupAccess,
+    note,
+    persons_own,
+)
 from .mesh_data import Refusal, Surface, foreach
 
 _LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
@@ -50,6 +63,7 @@ def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Sur
         As `require_room`; nothing is written.
     """
     require_room(obj, [name])
+    note(obj)
     render = next((x.name for x in obj.data.uv_layers if x.active_render), None)
     plane = np.stack([disc.real, disc.imag], axis=1) / 2 + 0.5
     bare = np.bincount(surface.corner_polygon, np.isnan(disc.real)[surface.corner_vertex]) > 0
@@ -124,6 +138,7 @@ def disc_color(disc: Complexes) -> Floats:
 
 def write_color(obj: bpy.types.Object, name: str, color: Floats, covered: Booleans) -> None:
     """Write a linear color per vertex, (n, 4), `NO_COUNTERPART` where not covered, and make it the active one."""
+    note(obj)
     attributes = obj.data.attributes
     render = attributes.default_color_name
     _COLOR.write(obj, name, np.where(covered[:, None], color, NO_COUNTERPART), np.ones(len(color), bool))
@@ -134,6 +149,7 @@ def write_color(obj: bpy.types.Object, name: str, color: Floats, covered: Boolea
 
 def write_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
     """Write weights, (n,), as a vertex group made anew, and leave the person's active group active."""
+    note(obj)
     groups = obj.vertex_groups
     active = groups.active.name if groups.active else None
     if name in groups:
@@ -141,3 +157,29 @@ def write_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
     VertexGroupAccess().write(obj, name, weights, np.ones(len(weights), bool))
     if active is not None and active in groups:
         groups.active = groups[active]
+
+
+def clear_results(obj: bpy.types.Object) -> int:
+    """Remove all of these from an object's mesh, with the alignment it keeps, and return how many things there were.
+
+    What was active before is so again; what the person has made active since stays so. Something of another kind that
+    has one of the names is not ours and stays.
+    """
+    mesh, groups, own = obj.data, obj.vertex_groups, persons_own(obj)
+    layouts = OWN_NAMES & {DISC_LAYOUT, SHARED_LAYOUT}
+    kinds = ((_LAYOUT, layouts), (_COLOR, OWN_NAMES - layouts - {MATCHED_GROUP}))
+    names = [name for access, of_kind in kinds for name in access.existing(obj, sorted(of_kind))]
+    for name in names:
+        if name in layouts:
+            mesh.uv_layers.remove(mesh.uv_layers[name])
+        else:
+            mesh.attributes.remove(mesh.attributes[name])
+    removed = len(names) + bool(mesh.mobius_alignment.target_fingerprint)
+    if MATCHED_GROUP in groups:
+        groups.remove(groups[MATCHED_GROUP])
+        removed += 1
+    own.put_back(obj)
+    mesh.property_unset("mobius_alignment")
+    mesh.property_unset("mobius_before")
+    mesh.update()
+    return removed

@@ -13,6 +13,8 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Alignment, Correspondence, report
+from . import earlier_version
+from .fingerprints import fingerprint_of
 from .mesh_data import Refusal, Surface
 
 
@@ -43,8 +45,9 @@ def store(
         confidence=correspondence.confidence.astype(np.float32),
     )
     kept = target.data.mobius_alignment
-    kept.source = source
-    kept.source_fingerprint, kept.target_fingerprint = (surface.fingerprint() for surface in surfaces)
+    kept.property_unset("source")  # of an earlier version
+    kept.source_name, kept.source_size = source.name, len(surfaces[0].mesh.vertices)
+    kept.source_fingerprint, kept.target_fingerprint = (surface.rest.fingerprint for surface in surfaces)
     kept.value = alignment.value
     kept.upper_bound = alignment.search.upper_bound
     kept.certified = alignment.certified
@@ -57,9 +60,15 @@ def store(
 
 
 def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
-    """Return whether the target's mesh keeps an alignment with this source (stale or not)."""
+    """Return whether the target's mesh keeps an alignment with this source, by its name (stale or not) or its shape."""
     kept = target.data.mobius_alignment
-    return bool(kept.target_fingerprint) and kept.source == source
+    if not kept.target_fingerprint:
+        return False
+    if kept.source is not None:  # in a linked mesh of an earlier version, which cannot be written
+        return kept.source == source
+    if kept.source_name == source.name:
+        return True
+    return kept.source_size == len(source.data.vertices) and kept.source_fingerprint == fingerprint_of(source)
 
 
 def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
@@ -95,7 +104,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
         (source, source_surface, kept.source_fingerprint),
         (target, target_surface, kept.target_fingerprint),
     ):
-        if surface.fingerprint() != fingerprint:
+        if surface.rest.fingerprint != fingerprint and earlier_version.fingerprint(surface.rest) != fingerprint:
             raise Refusal(rpt_("'{}' has been edited since it was aligned: press Align again").format(obj.name))
     arrays = _unpack(kept.packed, target.name)
     return Correspondence(

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from typing import Any
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import stored_alignment
+
+MODES = ("OBJECT", "POSE")
+"""Of a window, in which meshes are written: other modes keep undo steps of their own, which would lack ours."""
+
+_RENDERS = ("RENDER", "OBJECT_BAKE")
 
 
 def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, writes: bool = True) -> str | None:
@@ -30,10 +38,25 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
         return text.format(obj.name, called)
     if not is_in_scene(obj, scene):
         return rpt_("'{}' is not in this scene: choose another {}").format(obj.name, called)
+    return _why_not_read(obj) or (why_not_written(obj) if writes else None)
+
+
+def _why_not_read(obj: bpy.types.Object) -> str | None:
+    """Return why the mesh of an object cannot be read, or None if it can."""
     if obj.mode != "OBJECT":
         mode = obj.mode.replace("_", " ").title()
         return rpt_("'{}' is in {} Mode: switch to Object Mode first").format(obj.name, mode)
-    if writes and not (obj.is_editable and obj.data.is_editable):
+    if obj.data.is_editmode:
+        text = rpt_("'{}' shares its mesh with an object in Edit Mode: switch to Object Mode first")
+        return text.format(obj.name)
+    return None
+
+
+def why_not_written(obj: bpy.types.Object) -> str | None:
+    """Return why a mesh object of any scene cannot be changed, or None if it can."""
+    if reason := _why_not_read(obj):
+        return reason
+    if not (obj.is_editable and obj.data.is_editable):
         text = rpt_("'{}' is linked from another file: make it local first (Object > Relations > Make Local)")
         return text.format(obj.name)
     return None
@@ -45,13 +68,36 @@ def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     return scene.objects.get(obj.name) == obj or any(other == obj for other in scene.objects)
 
 
-def why_not_pair(
-    settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes_source: bool, writes_target: bool = True
-) -> str | None:
+def by_uid(among: Iterable[Any], uid: int | None) -> Any:
+    """Return the datablock with Blender's number of this session, which undo and renaming leave alone, or None."""
+    return next((block for block in among if block.session_uid == uid), None)
+
+
+def why_not_now(context: bpy.types.Context, objects: Sequence[bpy.types.Object | None]) -> str | None:
+    """Return why nothing can be written on these meshes for the time being, or None if it can; None is no object."""
+    if any(bpy.app.is_job_running(job) for job in _RENDERS):
+        return rpt_("the render has to end")
+    for obj in objects:
+        if obj is not None and obj.type == "MESH" and (obj.mode != "OBJECT" or obj.data.is_editmode):
+            return rpt_("'{}' has to be in Object Mode").format(obj.name)
+    active = [window.view_layer.objects.active for window in context.window_manager.windows]
+    if other := next((obj for obj in active if obj is not None and obj.mode not in MODES), None):
+        return rpt_("'{}' has to be in Object Mode").format(other.name)
+    return None
+
+
+def why_not_mode(context: bpy.types.Context) -> str | None:
+    """Return why no mesh can be written in the mode of the context, or None if it can."""
+    return None if context.mode in MODES else rpt_("Switch to Object Mode first")
+
+
+def why_not_pair(context: bpy.types.Context, *, writes_source: bool, writes_target: bool = True) -> str | None:
     """Return why the chosen source and target cannot be used together, or None if they can."""
+    settings, scene = context.scene.mobius, context.scene
     source, target = settings.source, settings.target
     reason = why_not(source, "source mesh", scene, writes=writes_source)
-    return reason or why_not(target, "target mesh", scene, writes=writes_target) or why_not_two(source, target)
+    reason = reason or why_not(target, "target mesh", scene, writes=writes_target) or why_not_two(source, target)
+    return reason or (why_not_mode(context) if writes_source or writes_target else None)
 
 
 def why_not_two(source: bpy.types.Object, target: bpy.types.Object) -> str | None:
@@ -67,12 +113,15 @@ def why_not_two(source: bpy.types.Object, target: bpy.types.Object) -> str | Non
     return None
 
 
-def why_not_aligned(settings: bpy.types.PropertyGroup, scene: bpy.types.Scene, *, writes: bool = True) -> str | None:
+def why_not_aligned(
+    context: bpy.types.Context, *, writes_source: bool = False, writes_target: bool = True
+) -> str | None:
     """Return why the alignment of the chosen source and target cannot be used, or None if it can.
 
-    `writes` tells whether the target will be changed.
+    `writes_source` and `writes_target` tell which of them will be changed.
     """
-    reason = why_not_pair(settings, scene, writes_source=False, writes_target=writes)
+    reason = why_not_pair(context, writes_source=writes_source, writes_target=writes_target)
+    settings = context.scene.mobius
     if reason is None and not stored_alignment.exists(settings.target, settings.source):
         reason = stored_alignment.missing(settings.target, settings.source)
     return reason

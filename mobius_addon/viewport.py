@@ -6,8 +6,12 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver.surface.mesh import Floats
+
+# type and color of the shading that viewports had before they showed our colors; of the session
+_before: dict[int, tuple[str, str]] = {}
 
 
 def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
@@ -32,10 +36,30 @@ def show_colors(context: bpy.types.Context) -> None:
     space = space_of(context)
     if space is None:
         return
-    if space.shading.type in ("WIREFRAME", "SOLID"):
-        space.shading.type = "SOLID"
-        space.shading.color_type = "VERTEX"
+    shading = space.shading
+    if shading.type in ("WIREFRAME", "SOLID"):
+        if (shading.type, shading.color_type) != ("SOLID", "VERTEX"):
+            _before[space.as_pointer()] = shading.type, shading.color_type
+        shading.type = "SOLID"
+        shading.color_type = "VERTEX"
     context.window_manager.mobius_view.legend = True
+
+
+def show_as_before(context: bpy.types.Context) -> None:
+    """Undo `show_colors` in every viewport that still shows them, and take the overlay's pictures away."""
+    for screen in bpy.data.screens:
+        for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
+            before = _before.pop(space.as_pointer(), None)
+            if before and (space.shading.type, space.shading.color_type) == ("SOLID", "VERTEX"):
+                space.shading.color_type = before[1]
+                space.shading.type = before[0]
+    view = context.window_manager.mobius_view
+    view.matches = view.discs = view.legend = False
+
+
+def forget_shading() -> None:
+    """Forget what viewports showed before: they are gone."""
+    _before.clear()
 
 
 def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:
@@ -89,14 +113,35 @@ def look_at_all_again(context: bpy.types.Context) -> None:
         _toggle_local_view(context)
 
 
-def edit(context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """Go to Edit Mode of an object and, where there is a window, look at what is selected of it."""
+def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
+    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it.
+
+    Returns
+    -------
+    str or None
+        Why that is not possible, and nothing was done; None if it was.
+    """
+    layer, space = context.view_layer, space_of(context)
+    layer.update()
+    if layer.objects.get(obj.name) != obj:
+        text = rpt_("'{}' is in no collection of this view layer: include its collection in the Outliner to see them")
+        return text.format(obj.name)
+    hidden = obj.hide_get()
     obj.hide_set(False)
-    context.view_layer.objects.active = obj
+    if not obj.visible_get():
+        obj.hide_set(hidden)
+        text = rpt_("'{}' is disabled in viewports, or its collection is hidden: show it in the Outliner to see them")
+        return text.format(obj.name)
+    if space is not None and space.local_view:
+        obj.local_view_set(space, True)
+    for other in layer.objects:  # what is selected would go to Edit Mode too
+        other.select_set(other == obj)
+    layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    if space_of(context) is not None:
+    if space is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()
+    return None
 
 
 def _toggle_local_view(context: bpy.types.Context) -> None:

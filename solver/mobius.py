@@ -99,10 +99,34 @@ def hyperbolic_distance(x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
 
 
 def hyperbolic_disc(centre: npt.ArrayLike, tau: npt.ArrayLike) -> tuple[Complexes, Floats]:
-    """Return Euclidean centres and radii of the discs {x : hyperbolic_distance(x, centre) <= tau}, 0 < tau < 1."""
+    """Return Euclidean centres and radii of the discs {x : hyperbolic_distance(x, centre) <= tau}, 0 < tau < 1.
+
+    Both are off by less than 2^-47, whatever cancels; not so the radius over 1 - |centre| next to the unit circle.
+    """
     b, tau = np.asarray(centre, np.complex128), np.asarray(tau, np.float64)
-    scale = 1 / (1 - tau**2 * np.abs(b) ** 2)
-    return b * (1 - tau**2) * scale, tau * (1 - np.abs(b) ** 2) * scale
+    inward, narrowing, scale = 1 - np.abs(b) ** 2, 1 - tau**2, 1 / (1 - tau**2 * np.abs(b) ** 2)
+    if (wide := scale > 8).any():
+        # there both differences are taken to their last digits, and 1 - tau^2 |b|^2 is their sum
+        inward = np.where(wide, one_less_square(b), inward)
+        narrowing = np.where(wide, (1 - tau) * (1 + tau), narrowing)
+        scale = np.where(wide, 1 / (narrowing + tau**2 * inward), scale)
+    return b * narrowing * scale, tau * inward * scale
+
+
+def one_less_square(x: Complexes) -> Floats:
+    """Return 1 - |x|^2 to its last digits, where floats alone lose some to cancellation; |x| <= 1."""
+    parts = np.stack([x.real, x.imag])
+    square = parts * parts
+    # Dekker's product: halves of 26 digits multiply without rounding
+    high = parts * 134217729.0
+    high = high - (high - parts)
+    low = parts - high
+    rest = ((high * high - square) + 2 * high * low) + low * low
+    large, small = np.maximum(*square), np.minimum(*square)
+    apart = 1 - large  # exact from 1/2 on, as |x| near 1 makes it
+    total = apart - small
+    shift = total - apart
+    return total + (((apart - (total - shift)) + (-small - shift)) - rest.sum(axis=0))
 
 
 def conformal_barycentre(points: Complexes, weights: Floats, tolerance: float = 1e-12) -> complex:

@@ -12,9 +12,13 @@ from .access import (
     Layer,
     numbered,
 )
+from .active import ActiveLayers, note, persons_own
 from .carrier import Carrier
 from .masks import mask_names, mask_weights
-from .plan import Carried, Reading, Transfer, plan_transfer, read_transfer, restored_on_failure, write_transfers
+from .plan import Carried, Transfer, restored_on_failure, write_transfers
+from .preview import Preview, preview
+from .reading import Reading, plan_transfer, read_transfer
+from .record import forget_written
 from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
 from .unmatched import Unmatched, carrier_between, unmatched_vertices
@@ -30,12 +34,14 @@ __all__ = [
     "ROWS",
     "SHARED_COLOR",
     "SHARED_LAYOUT",
+    "ActiveLayers",
     "AttributeAccess",
     "Carried",
     "Carrier",
     "Kind",
     "Layer",
     "Mask",
+    "Preview",
     "Reading",
     "Row",
     "Transfer",
@@ -43,10 +49,14 @@ __all__ = [
     "Unmatched",
     "VertexGroupAccess",
     "carrier_between",
+    "forget_written",
     "mask_names",
     "mask_weights",
+    "note",
     "numbered",
+    "persons_own",
     "plan_transfer",
+    "preview",
     "read_transfer",
     "restored_on_failure",
     "split_names",

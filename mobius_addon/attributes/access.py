@@ -59,20 +59,24 @@ class Access(Protocol):
         """What elements of the mesh have a value: "POINT", "EDGE", "FACE" or "CORNER"."""
         ...
 
+    def names(self, obj: bpy.types.Object) -> list[str]:
+        """Return the names of the layers of this type, except those that are not the person's own content."""
+        ...
+
     def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
-        """Read the layers of this type whose names are chosen, except those that are not the person's own content."""
+        """Read those of the layers that `names` gives whose names are chosen."""
         ...
 
     def place(self, obj: bpy.types.Object, name: str, reserved: Set[str], *, number: bool = False) -> str | None:
         """Return the name under which `write` will store a layer, or None where the person has locked it.
 
         `reserved` are the names that other layers of the same transfer take. With `number`, a layer that is there
-        already is not replaced: the name gets Blender's number.
+        already is not replaced: the name gets Blender's number. What a mesh has once is never numbered.
         """
         ...
 
     def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
-        """Read those of the layers of these names that are there, if values of this type can be mixed."""
+        """Read those of the layers of these names that are there, in a form in which they can be compared."""
         ...
 
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
@@ -106,11 +110,17 @@ class AttributeAccess:
     dtype: str = "float32"
     only: frozenset[str] = frozenset()
 
+    def names(self, obj: bpy.types.Object) -> list[str]:
+        """Return the names of attributes of this type and domain that are content, or those of `only`."""
+        there = [a.name for a in obj.data.attributes if self._is_own_kind(a)]
+        if self.only:
+            return [name for name in there if name in self.only]
+        return [x for x in there if x not in BUILT_IN and x not in OWN_NAMES and not x.startswith(".")]
+
     def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
-        """Read the chosen attributes of this type and domain."""
-        for name in [a.name for a in obj.data.attributes if self._is_own_kind(a)]:
-            general = name not in BUILT_IN and name not in OWN_NAMES and not name.startswith(".")
-            if name in self.only or (general and not self.only and chosen(name)):
+        """Read the chosen attributes of this type and domain; those of `only` always are."""
+        for name in self.names(obj):
+            if self.only or chosen(name):
                 yield Layer(name, self.read(obj, name))
 
     def read(self, obj: bpy.types.Object, name: str) -> Values:

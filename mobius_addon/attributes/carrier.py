@@ -214,7 +214,7 @@ class Carrier:
 
     @cached_property
     def _similarities(self) -> tuple[Floats, Floats]:
-        return local_similarities(self.correspondence, self.source.mesh, self.target.mesh)
+        return local_similarities(self.correspondence, self.source.rest, self.target.rest)
 
     @cached_property
     def _polygon_of_triangle(self) -> Integers:

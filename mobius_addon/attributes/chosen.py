@@ -7,6 +7,7 @@ from collections.abc import Callable
 import bpy
 
 from ..mesh_data import Refusal
+from .active import persons_own
 from .settings import TransferSettings
 
 
@@ -39,17 +40,16 @@ def chosen_layers(
 
 
 def active_name(kind: str, obj: bpy.types.Object) -> str | None:
-    """Return the name of an object's active layer of a kind, if it has one."""
-    mesh = obj.data
-    if kind == "colors":
-        return mesh.attributes.active_color_name
-    active = {
-        "vertex-groups": obj.vertex_groups.active,
-        "shape-keys": obj.active_shape_key,
-        "uv": mesh.uv_layers.active,
-        "attributes": mesh.attributes.active,
-    }.get(kind)
-    return None if active is None else active.name
+    """Return the name of an object's active layer of a kind, if it has one; see `persons_own`."""
+    own = persons_own(obj)
+    key = obj.active_shape_key
+    return {
+        "vertex-groups": own.group,
+        "shape-keys": key.name if key is not None else "",
+        "uv": own.uv,
+        "colors": own.color,
+        "attributes": own.attribute,
+    }.get(kind) or None
 
 
 def deforming_bones(obj: bpy.types.Object) -> frozenset[str]:

@@ -19,6 +19,10 @@ class MaterialAccess:
 
     domain = "FACE"
 
+    def names(self, obj: bpy.types.Object) -> list[str]:
+        """Return the one name that stands for all slots, if there is any."""
+        return ["Materials"] if len(obj.material_slots) else []
+
     def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
         """Read the slots, if there are any, as one layer."""
         slots = [_key(slot.material) for slot in obj.material_slots]
@@ -31,8 +35,17 @@ class MaterialAccess:
         return name
 
     def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
-        """Return nothing: materials are not mixed."""
-        return {}
+        """Return the material of each polygon, as `describe` does, if the object has any."""
+        slots = [_key(slot.material) for slot in obj.material_slots]
+        if not any(slots):
+            return {}
+        index = foreach(obj.data.polygons, "material_index", 1, np.int32)
+        return dict.fromkeys(names, self.describe(np.minimum(index, len(slots) - 1), slots))
+
+    @staticmethod
+    def describe(values: Values, slots: Sequence[Any]) -> Values:
+        """Return the material of each polygon, (p,) texts, from its slot."""
+        return np.array([repr(slot) for slot in slots], object)[values]
 
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
         """Add the materials that are used and missing, and set the slot of each polygon."""

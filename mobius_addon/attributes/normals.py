@@ -23,6 +23,10 @@ class NormalAccess:
 
     domain = "CORNER"
 
+    def names(self, obj: bpy.types.Object) -> list[str]:
+        """Return the one name that stands for custom normals, if there are any."""
+        return ["Custom Normals"] if obj.data.has_custom_normals else []
+
     def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
         """Read the normals, if the mesh has custom ones."""
         if obj.data.has_custom_normals:
@@ -33,8 +37,8 @@ class NormalAccess:
         return name
 
     def existing(self, obj: bpy.types.Object, names: Sequence[str]) -> dict[str, Values]:
-        """Return nothing: normals are not mixed."""
-        return {}
+        """Return the custom normals, if the mesh has any."""
+        return dict.fromkeys(names, mirrored(obj, _normals(obj))) if self.names(obj) else {}
 
     def write(self, obj: bpy.types.Object, name: str, values: Values, covered: Booleans, about: Any = None) -> None:
         """Set the normals; elsewhere they stay as they are seen now."""

@@ -64,7 +64,9 @@ class TransferSettings:
     evaluated : bool
         Read the source as its modifiers and shape keys show it.
     collisions : str
-        Whether a layer whose name is taken will "replace" the one that bears it or get Blender's "number".
+        Whether a layer whose name is taken by another of the person's own will "replace" that one or get Blender's
+        "number"; what an earlier transfer wrote and nobody has edited is always replaced. Where `mix` or `target_mask`
+        say how values join those that are there, they join them.
 
     Raises
     ------
@@ -85,7 +87,7 @@ class TransferSettings:
     target_mask: Mask = field(default_factory=Mask)
     unmatched: Outcome = "carry"
     evaluated: bool = False
-    collisions: Literal["replace", "number"] = "replace"
+    collisions: Literal["replace", "number"] = "number"
 
     def __post_init__(self) -> None:
         if not 0 <= self.mix_factor <= 1:

@@ -51,6 +51,9 @@ KINDS = (
     ),
 )
 
+NOUNS = {kind.identifier: kind.noun for kind in KINDS}
+"""What kinds are called within a sentence, by identifier."""
+
 Carry = Callable[[Carrier, Values], tuple[Values, Booleans]]
 
 
@@ -70,6 +73,11 @@ class Row:
     def marks(self) -> bool:
         """Whether this is something that a mesh has once under a name of Blender's own, as seams and masks."""
         return isinstance(self.access, AttributeAccess) and bool(self.access.only)
+
+    @property
+    def once(self) -> bool:
+        """Whether a mesh cannot have two of it."""
+        return self.marks or isinstance(self.access, MaterialAccess | NormalAccess)
 
 
 # data type: what foreach_get calls it, numbers per element, numpy's type, how it is carried on points and on corners

@@ -20,9 +20,13 @@ class VertexGroupAccess:
 
     domain = "POINT"
 
+    def names(self, obj: bpy.types.Object) -> list[str]:
+        """Return the names of the groups."""
+        return [group.name for group in obj.vertex_groups if group.name not in OWN_NAMES]
+
     def layers(self, obj: bpy.types.Object, chosen: Callable[[str], bool]) -> Iterator[Layer]:
         """Read the chosen vertex groups, each as a dense column of weights."""
-        names = [group.name for group in obj.vertex_groups if group.name not in OWN_NAMES and chosen(group.name)]
+        names = [name for name in self.names(obj) if chosen(name)]
         for name, column in zip(names, read_weights(obj, names).T, strict=True):
             yield Layer(name, column)
 

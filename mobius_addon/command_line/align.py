@@ -26,11 +26,12 @@ def run(options: argparse.Namespace) -> int:
     inputs = [options.source, options.target, options.landmarks]
     require_writable(others=[options.map, options.report], inputs=inputs)
     with opened_pair(options, write=False) as (source, target, _):
-        alignment, correspondence = align_pair(options, read_pair(options, source, target), settings)
+        surfaces = read_pair(options, source, target)
+        alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
         notes = orders(options.map, (source, target))
     with outputs() as written:
         if options.map:
-            save_map(written.path(options.map), alignment, correspondence)
+            save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
         if options.report:
             write_report(written.path(options.report), report(alignment, correspondence))
     warn(notes)

@@ -35,7 +35,8 @@ def _add_align_options(group: argparse._ArgumentGroup) -> None:
         "--landmarks",
         metavar="FILE",
         type=Path,
-        help="known pairs, one on each line: two vertex numbers, or x y z on the source and x y z on the target",
+        help="known pairs, one on each line: two vertex numbers, or x y z on the source and x y z on the target in the "
+        "axes and units of their files",
     )
     group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
     group.add_argument("--targets", type=int, metavar="N", help="target points of the search")

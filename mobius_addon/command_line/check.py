@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
     from ...solver import MeshError, topology
-    from ..files import Unreadable, import_meshes, new_scene, split_object_name
+    from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name
     from ..mesh_data import read_surface
 
     status = DONE
@@ -26,21 +26,23 @@ def run(options: argparse.Namespace) -> int:
         path, wanted = split_object_name(argument)
         new_scene()
         try:
-            found = import_meshes(path)
-            chosen = [x for x in found if wanted in (None, x.name)]
-            if not chosen:
-                raise Unreadable(f"'{path}' has no mesh object named '{wanted}'")
+            found = chosen(import_meshes(path), path, wanted)
         except Unreadable as error:
             say_error(f"mobius: {error}")
             status = UNUSABLE
             continue
-        for imported in chosen:
-            name = argument if len(chosen) == 1 else f"{path}:{imported.name}"
+        for imported in found:
+            name = argument if len(found) == 1 else f"{path}:{imported.name}"
             try:
+                require_places(imported)
                 what = topology(read_surface(imported.obj, name).mesh)
                 line, is_disc = what.describe(), what.is_disc
             except MeshError as error:
                 line, is_disc = "not a disc: it " + str(error).removeprefix(f"'{name}' "), False
+            except Unreadable as error:
+                say_error(f"mobius: {error}")
+                status = UNUSABLE
+                continue
             say(f"{name}: {line}")
             if not is_disc:
                 status = max(status, NOT_ALIGNED)

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
                 "warnings": list(notes),
             }
             write_report(written.path(options.report), figures)
-    warn([*file.notes, *notes, *lost])
+    warn([*notes, *lost])
     say(
         f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
         f"(median {found.median_angle_error:.2f}°, 99 % {found.percentile_99_angle_error:.1f}°, "

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..mesh_data import Surface
 
-MESH_HELP = "any file Blender imports (.blend .obj .ply .stl .glb .gltf .fbx .usd); FILE:OBJECT names an object"
+MESH_HELP = (
+    "any file Blender imports (.blend .obj .ply .stl .glb .gltf .vrm .fbx .usd), or .off .vtk .gii; "
+    "FILE:OBJECT names an object"
+)
 OUTER_HELP = "number, from 0, of a vertex on the outer boundary, for --fill-holes; default: the longest boundary"
 
 

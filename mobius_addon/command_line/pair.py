@@ -38,23 +38,29 @@ def opened_pair(options: argparse.Namespace, *, write: bool) -> Iterator[tuple[I
 
 
 def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -> tuple[Surface, Surface]:
-    """Return source and target as arrays, named as on the command line."""
-    from ..mesh_data import read_surface
+    """Return source and target as arrays, named as on the command line, and say where they look otherwise."""
+    from ..mesh_data import read_surface, unseen_warning
 
+    for imported in (source, target):
+        if warning := unseen_warning(imported.obj):
+            say_error(f"mobius: warning: {warning}")
     return read_surface(source.obj, options.source), read_surface(target.obj, options.target)
 
 
 def align_pair(
-    options: argparse.Namespace, surfaces: tuple[Surface, Surface], settings: AlignSettings
+    options: argparse.Namespace,
+    files: tuple[Imported, Imported],
+    surfaces: tuple[Surface, Surface],
+    settings: AlignSettings,
 ) -> tuple[Alignment, Correspondence]:
-    """Align two surfaces and say what was found."""
+    """Align two surfaces, which were read from these files, and say what was found."""
     from ..computation import aligned
     from ..operators.align import summary
 
     source, target = surfaces
     require_outer(settings.source_outer, options, "--source-outer", source)
     require_outer(settings.target_outer, options, "--target-outer", target)
-    pairs = _landmarks(options, (source.mesh, target.mesh))
+    pairs = _landmarks(options, files, (source.mesh, target.mesh))
     alignment, correspondence = aligned(
         source.mesh, target.mesh, settings, largest_part=options.largest_part, landmarks=pairs
     )
@@ -65,17 +71,18 @@ def align_pair(
     return alignment, correspondence
 
 
-def _landmarks(options: argparse.Namespace, meshes: tuple[TriangleMesh, TriangleMesh]) -> Integers | None:
-    """Return the pairs of the file that was given, if any."""
-    from ..files import Unreadable
-    from ..landmarks import from_file
+def _landmarks(
+    options: argparse.Namespace, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]
+) -> Integers | None:
+    """Return the pairs of the file that was given, if any, and say what is left out."""
+    from ..files import read_landmarks
 
     if options.landmarks is None:
         return None
-    try:
-        return from_file(options.landmarks, meshes)
-    except OSError as error:
-        raise Unreadable(f"'{options.landmarks}' cannot be read: {error.strerror}") from error
+    pairs, warnings = read_landmarks(options.landmarks, files, meshes)
+    for warning in warnings:
+        say_error(f"mobius: warning: {warning}")
+    return pairs
 
 
 def _same_mesh(source: str, target: str) -> bool:

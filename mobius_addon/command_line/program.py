@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..streams import NOT_ALIGNED, UNUSABLE, say_error, take_streams
+from contextlib import suppress
+
+from ..streams import NOT_ALIGNED, UNUSABLE, Unheard, say_error, take_streams
 from .parser import Usage, build_parser
 
 
@@ -19,8 +21,20 @@ def main(arguments: list[str], prog: str = "python .") -> int:
     Returns
     -------
     int
-        0 done; 1 could not be done with these meshes, the reason is on stderr; 2 wrong usage or unreadable input.
+        0 done; 1 could not be done with these meshes, the reason is on stderr; 2 wrong usage or unreadable input; 141
+        the reader of the output has gone.
     """
+    try:
+        return _run(arguments, prog)
+    except Unheard as unheard:
+        with suppress(Unheard):
+            if unheard.reason:
+                say_error(f"mobius: {unheard.reason}")
+        return unheard.status
+
+
+def _run(arguments: list[str], prog: str) -> int:
+    """Run one command and return its exit status."""
     try:
         options = build_parser(prog).parse_args(arguments)
     except Usage as usage:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -80,7 +79,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
         if options.use_map:
             correspondence = _fitting_map(load_map, options, surfaces)
         else:
-            alignment, correspondence = align_pair(options, surfaces, settings)
+            alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
         plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
         plan.write(target.obj)
         order = orders(options.map, (source, target))
@@ -88,7 +87,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
         backup = is_input(options.output, [options.source, options.target])
         lost = write_mesh(target.obj, options.output, written, backup=backup)
         if alignment and options.map:
-            save_map(written.path(options.map), alignment, correspondence)
+            save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
         if alignment and options.report:
             figures = report(alignment, correspondence) | {
                 "transferred": _listed(plan),
@@ -106,29 +105,20 @@ def _require_writable(options: argparse.Namespace) -> None:
 
 
 def _fitting_map(
-    load_map: Callable[[Path], Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
+    load_map: Callable[..., Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
 ) -> Correspondence:
     """Load a map and make sure that it is one between these two meshes."""
-    import numpy as np
-
     from ..files import Unreadable
 
     path = options.use_map
     if not path.is_file():
         raise Unreadable(f"there is no file '{path}'")
     try:
-        correspondence = load_map(path)
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise Unreadable(f"'{path}' is not a map that this program wrote") from error
-    source, target = surfaces
-    if not np.array_equal(correspondence.source_triangles, source.mesh.faces):
-        raise Unreadable(f"'{path}' was made for another source than '{options.source}'")
-    if len(correspondence.face) != len(target.mesh.vertices):
-        raise Unreadable(
-            f"'{path}' was made for a target of {len(correspondence.face):,} vertices, "
-            f"but '{options.target}' has {len(target.mesh.vertices):,}"
-        )
-    return correspondence
+        return load_map(path, *(surface.rest for surface in surfaces))
+    except OSError as error:
+        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
 
 
 def _listed(plan: Transfer) -> list[dict[str, str]]:

@@ -19,7 +19,10 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         "--deform-only", action="store_true", help="of the vertex groups, those of an armature's deforming bones"
     )
     group.add_argument(
-        "--collisions", choices=("replace", "number"), help="what a layer does whose name is taken; default: replace"
+        "--collisions",
+        choices=("replace", "number"),
+        help="what a layer does whose name another one of the target's own has: it takes its place or stands beside it "
+        "with a number (default)",
     )
     group.add_argument(
         "--mix", choices=("replace", "add", "subtract", "multiply"), help="with values that are there; default: replace"

@@ -1,18 +1,22 @@
 """Meshes in and out of files, through Blender's own importers and exporters."""
 
-from .formats import FORMATS, Format, Unreadable, format_of, split_object_name
+from .formats import FORMATS, READ_ONLY, Format, format_of, split_object_name
+from .landmark_file import read_landmarks
 from .opening import Opened, opened
 from .publishing import Outputs, outputs, real_place, require_folder, require_place
-from .reading import Imported, import_mesh, import_meshes, new_scene
+from .reading import Imported, chosen, import_mesh, import_meshes, new_scene, require_places
+from .unreadable import Unreadable
 from .writing import export_mesh, write_mesh
 
 __all__ = [
     "FORMATS",
+    "READ_ONLY",
     "Format",
     "Imported",
     "Opened",
     "Outputs",
     "Unreadable",
+    "chosen",
     "export_mesh",
     "format_of",
     "import_mesh",
@@ -20,9 +24,11 @@ __all__ = [
     "new_scene",
     "opened",
     "outputs",
+    "read_landmarks",
     "real_place",
     "require_folder",
     "require_place",
+    "require_places",
     "split_object_name",
     "write_mesh",
 ]

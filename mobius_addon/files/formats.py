@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import tempfile
@@ -13,12 +14,9 @@ from typing import Any
 import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
 
-from ..mesh_data import Refusal
+from . import blend, gifti, off, vtk
 from .joining import join_along_seams, join_coinciding
-
-
-class Unreadable(Refusal):
-    """A file is missing, of an unknown kind or damaged, or does not hold the one mesh that is needed."""
+from .unreadable import Unreadable
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,8 @@ class Format:
     Parameters
     ----------
     importer, exporter : callable
-        Read a path into the scene; write the selected objects to a path with a small ending.
+        Read a path into the scene; write the selected objects to a path with a small ending. An importer may return
+        the list of objects that the file has; otherwise they are those that are new.
     join : callable
         Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
@@ -45,13 +44,6 @@ def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
     if module is not None and not addon_utils.check(module)[1]:
         addon_utils.enable(module)
     return operator
-
-
-def _load_blend(path: str) -> None:
-    with bpy.data.libraries.load(path) as (stored, wanted):
-        wanted.objects = stored.objects
-    for obj in wanted.objects:
-        bpy.context.scene.collection.objects.link(obj)
 
 
 def _save_blend(path: str) -> None:
@@ -84,7 +76,7 @@ def _import_usd(path: str) -> None:
         bpy.ops.wm.usd_import(filepath=shutil.copyfile(path, str(Path(folder) / Path(small).name)))
 
 
-_BLEND = Format(_load_blend, _save_blend)
+_BLEND = Format(blend.read, _save_blend)
 _OBJ = Format(
     lambda path: bpy.ops.wm.obj_import(filepath=path),
     lambda path: bpy.ops.wm.obj_export(
@@ -130,42 +122,83 @@ FORMATS = {
     ".usdz": _USD,
 }
 
-_NAMED = re.compile(rf"(.*(?:{'|'.join(map(re.escape, FORMATS))})):(.+)", re.IGNORECASE | re.DOTALL)
+
+@dataclass(frozen=True)
+class ReadOnly:
+    """A kind of file that is read and not written; see `Format`."""
+
+    importer: Callable[[str], object]
+    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
+
+
+READ_ONLY = {
+    ".vrm": ReadOnly(_GLTF.importer, _GLTF.join),  # a .glb with an avatar's rig described in it
+    ".off": ReadOnly(off.read),
+    ".vtk": ReadOnly(vtk.read),
+    ".gii": ReadOnly(gifti.read),
+}
+
+_OBJECT = re.compile(f"({'|'.join(map(re.escape, [*FORMATS, *READ_ONLY]))})(?P<colon>:)", re.IGNORECASE)
+"""Where in FILE:Object the file ends."""
 
 
 def split_object_name(argument: str) -> tuple[Path, str | None]:
     """Split FILE:Object into the file and the object's name; a file without a name gives None.
 
-    >>> split_object_name("scans.blend:Scan.003")
-    (PosixPath('scans.blend'), 'Scan.003')
+    >>> split_object_name("scans.BLEND:Scan.003")
+    (PosixPath('scans.BLEND'), 'Scan.003')
     """
-    if Path(argument).exists():
+    if os.path.lexists(argument):
         return Path(argument), None
-    named = _NAMED.fullmatch(argument)
-    if named is not None:
-        return Path(named[1]), named[2]
+    ends = [found.start("colon") for found in _OBJECT.finditer(argument) if argument[found.end("colon") :]]
+    if ends:
+        end = next((k for k in ends if os.path.lexists(argument[:k])), ends[0])
+        return Path(argument[:end]), argument[end + 1 :]
     return Path(argument), None
 
 
 def format_of(path: Path) -> Format:
-    """Return the format that a path's ending names.
+    """Return the format that the ending of a file to be written names.
+
+    Raises
+    ------
+    Unreadable
+        No such ending, or one of files that are only read.
+    """
+    found = FORMATS.get(path.suffix.lower())
+    if found is None and path.suffix.lower() in READ_ONLY:
+        raise Unreadable(f"'{path}': {path.suffix} files are read, but not written: use one of {' '.join(FORMATS)}")
+    if found is None:
+        raise Unreadable(f"'{path}' has an ending that is not known: use one of {' '.join(FORMATS)}")
+    return found
+
+
+def reader_of(path: Path) -> Format | ReadOnly:
+    """Return what reads a file with a path's ending.
 
     Raises
     ------
     Unreadable
         No such ending.
     """
-    found = FORMATS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    found = FORMATS.get(ending) or READ_ONLY.get(ending)
     if found is None:
-        known = " ".join(FORMATS)
+        known = " ".join([*FORMATS, *READ_ONLY])
         raise Unreadable(f"'{path}' has an ending that is not known: use one of {known}")
     return found
 
 
 def first_message(error: Exception) -> str:
-    """Return the first message of an importer's or exporter's error; of one in Python, what it ends with."""
+    """Return the first message of an importer's or exporter's error; of a traceback in it, what that ends with."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    if any(line.endswith("Traceback (most recent call last):") for line in lines):
-        errors = [line for line in lines if re.match(r"[\w.]*(Error|Exception|Interrupt)\b", line)]
-        return errors[-1] if errors else lines[-1]
+    if is_traceback(error):
+        # Blender adds where its own operator was called
+        named = [line for line in lines if re.match(r"[\w.]*(Error|Exception|Exit|Interrupt)\b", line)]
+        return named[-1] if named else lines[-1]
     return lines[0].removeprefix("Error:").strip() if lines else type(error).__name__
+
+
+def is_traceback(error: Exception) -> bool:
+    """Return whether an error of Blender passes on one that an importer or exporter in Python did not expect."""
+    return "Traceback (most recent call last)" in str(error)

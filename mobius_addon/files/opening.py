@@ -12,9 +12,11 @@ from typing import Any
 import bpy
 
 from ..mesh_data import Refusal
-from ..streams import quiet
-from .formats import Unreadable, first_message, split_object_name
-from .reading import Imported, choose, import_meshes, new_scene, require_file
+from ..streams import quiet, reading
+from .blend import require_local, with_shown
+from .formats import first_message, split_object_name
+from .reading import Imported, choose, import_meshes, new_scene, require_readable, scans
+from .unreadable import Unreadable
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +54,28 @@ def opened(target: str, source: str | None = None, *, write: bool = True) -> Ite
     Raises
     ------
     Unreadable
-        As `import_meshes` and `choose`; or the target is to be written and linked from another file.
+        As `import_meshes` and `choose`.
+    Refusal
+        The target is to be written and another file's; or both are one mesh.
     """
     target_path, target_name = split_object_name(target)
     source_path, source_name = split_object_name(source) if source is not None else (None, None)
     with ExitStack() as stack:
         found, lent = None, None
         if source_path is not None and not _same(source_path, target_path):
-            found = _pick(source_path, source_name, _open_file(source_path))
+            found = choose(_open_file(source_path), source_path, source_name)
             lent = stack.enter_context(_library(found))
         meshes = _open_file(target_path)
-        goal = _pick(target_path, target_name, meshes)
+        goal = choose(meshes, target_path, target_name)
+        if write:
+            require_local(goal.obj, target_path)
         before = {block.session_uid for block in _everything()}
-        notes = _make_writable(goal) if write else []
+        notes: list[str] = []
         if source_path is not None and found is None:
-            found = _pick(source_path, source_name, meshes)
-            if found.obj != goal.obj and found.obj.data == goal.obj.data:
+            found = choose(meshes, source_path, source_name)
+            if found.obj == goal.obj:
+                raise Refusal(f"'{source}' and '{target}' are one mesh: give two")
+            if found.obj.data == goal.obj.data:
                 raise Refusal(f"'{source}' and '{target}' share one mesh: make it single-user, or there is one only")
         elif found is not None and lent is not None:
             found = replace(found, obj=_append(*lent))
@@ -85,32 +93,21 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _open_file(path: Path) -> list[Imported]:
-    """Open a .blend, or import another file into an empty one, and return its meshes in alphabetical order.
-
-    Those that a .blend links come after its own.
-    """
+    """Open a .blend, or import another file into an empty one, and return its meshes; see `scans`."""
     if path.suffix.lower() != ".blend":
         new_scene()
         return import_meshes(path)
-    require_file(path)
+    require_readable(path)
     try:
-        with quiet():
+        with quiet(), reading(path):
             # as the person would open it: relative paths belong to the folder of a link, not of what that points to
             bpy.ops.wm.open_mainfile(
                 filepath=str(path.absolute()), load_ui=True, use_scripts=False, display_file_selector=False
             )
     except RuntimeError as error:
         raise Unreadable(f"'{path}' could not be read: {first_message(error)}") from error
-    meshes = [Imported(path, obj.name, obj) for obj in bpy.data.objects if obj.type == "MESH"]
-    if not meshes:
-        raise Unreadable(f"'{path}' holds no mesh")
-    return sorted(meshes, key=lambda imported: (imported.obj.library is not None, imported.name))
-
-
-def _pick(path: Path, wanted: str | None, meshes: list[Imported]) -> Imported:
-    """Return the mesh that is named, or the only one that is not linked from elsewhere; see `choose`."""
-    own = [x for x in meshes if x.obj.library is None]
-    return choose(path, wanted, meshes if wanted is not None or not own else own)
+    own, scenes = ([x for x in found if x.library is None] for found in (bpy.data.objects, bpy.data.scenes))
+    return scans(path, [Imported(path, obj.name, obj) for obj in with_shown(own, scenes)])
 
 
 @contextmanager
@@ -138,27 +135,6 @@ def _append(path: Path, name: str) -> bpy.types.Object:
     if obj is None:
         raise Unreadable(f"'{name}' could not be read from '{path}'")
     return obj
-
-
-def _make_writable(found: Imported) -> list[str]:
-    """Give an object a mesh of its own if another file owns that, and return a sentence about it.
-
-    Raises
-    ------
-    Unreadable
-        Another file owns the object.
-    """
-    obj = found.obj
-    if obj.library is not None:
-        raise Unreadable(
-            f"'{found.name}' is linked from '{obj.library.filepath}' and cannot be changed in '{found.path}': "
-            "name that file, or make the object local"
-        )
-    owner = obj.data.library or obj.data.override_library
-    if owner is None:
-        return []
-    obj.data = obj.data.copy()
-    return [f"the mesh of '{found.name}' belongs to another file: '{found.name}' gets a copy of its own"]
 
 
 @contextmanager

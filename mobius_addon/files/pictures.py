@@ -149,4 +149,4 @@ def separate_gltf_pictures(written: Path, folder: Path) -> None:
         if name != file.name:
             taken[name.lower()] = file.rename(file.with_name(name))
             image["uri"] = quote(name)
-    written.write_text(json.dumps(document, indent="\t", ensure_ascii=False), encoding="utf-8")
+    written.write_text(json.dumps(document, indent="\t", separators=(",", ":"), ensure_ascii=False), encoding="utf-8")

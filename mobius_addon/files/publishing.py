@@ -13,9 +13,9 @@ from pathlib import Path
 import bpy
 
 from ..mesh_data import Refusal
-from .formats import Unreadable
 from .parts import own_parts
 from .temporary import temporary_folder
+from .unreadable import Unreadable
 
 
 def real_place(path: Path) -> Path:

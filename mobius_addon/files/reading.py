@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
+import numpy as np
 
-from ..streams import quiet
-from .formats import Unreadable, first_message, format_of, split_object_name
+from ...solver.surface.mesh import Floats
+from ..mesh_data import foreach, mirrored
+from ..streams import quiet, reading
+from .blend import missing_libraries
+from .formats import first_message, is_traceback, reader_of, split_object_name
+from .headers import require_sound
+from .unreadable import Unreadable, no_numbers
 
 
 def new_scene() -> None:
     """Begin with an empty scene; the person's settings and add-ons stay."""
     with quiet():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+_Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""Turns glTF's coordinates, whose y points up, to Blender's, as Blender's importer turns vertices and objects."""
 
 
 @dataclass(frozen=True)
@@ -50,46 +60,113 @@ class Imported:
                 return f"Blender leaves out {dropped:,} that no face of this object uses"
         return None
 
+    def readings(self, points: Floats) -> list[tuple[str, Floats]]:
+        """Return what points in a file beside this one, (l, 3), may mean, in the coordinates of the object's `Surface`.
 
-def require_file(path: Path) -> None:
-    """Raise `Unreadable` if there is nothing to read at `path`."""
-    if not path.is_file():
-        raise Unreadable(f"'{path}' is not a file" if path.exists() else f"there is no file '{path}'")
-    if path.stat().st_size == 0:
-        raise Unreadable(f"'{path}' is empty")
+        First, the coordinates that the file keeps for this mesh; then those of the scene that the file places it in,
+        and those that Blender gives that scene.
+        """
+        turned = points @ _Y_UP.T if self.path.suffix.lower() in (".glb", ".gltf", ".vrm") else points
+        world = np.array(self.obj.matrix_world.inverted_safe(), dtype=np.float64)
+        found = [("the mesh's own coordinates", turned)]
+        for what, placed in (("places in the file's scene", turned), ("places as Blender shows the file", points)):
+            found.append((what, placed @ world[:3, :3].T + world[:3, 3]))
+        return [(what, mirrored(self.obj, placed)) for what, placed in found]
 
 
 def import_meshes(path: Path) -> list[Imported]:
-    """Import a file into the scene and return its mesh objects, in alphabetical order.
+    """Import a file into the scene and return its mesh objects, in alphabetical order; shapes of bones are none.
 
     Raises
     ------
     Unreadable
         The file is missing, not a mesh file or damaged, or holds no mesh.
     """
-    form = format_of(path)
-    require_file(path)
-    # set the scene's names aside, so that imported objects keep theirs
+    form = reader_of(path)
+    require_readable(path)
+    with reading(path):
+        meshes = scans(path, _import(path, form.importer))
+        return [replace(x, joined=form.join(x.obj.data)) for x in meshes]
+
+
+def _import(path: Path, importer: Callable[[str], object]) -> list[Imported]:
+    """Return all objects of a file, which bear their names there unless the scene's others have these."""
+    # set the scene's names aside, so that imported objects keep theirs; linked ones have names of their own
     before = {obj: obj.name for obj in bpy.data.objects}
-    for number, obj in enumerate(before):
+    local = {obj: name for obj, name in before.items() if obj.library is None}
+    for number, obj in enumerate(local):
         obj.name = f".mobius-{number}"
+    objects: list[bpy.types.Object] = []
     try:
         with quiet():
-            form.importer(str(path.resolve()))
-    except (RuntimeError, OSError) as error:
-        raise Unreadable(f"'{path}' could not be read: {first_message(error)}") from error
+            listed = importer(str(path.resolve()))
+        objects = listed if isinstance(listed, list) else [obj for obj in bpy.data.objects if obj not in before]
+    except Unreadable as error:
+        raise Unreadable(str(error).replace(str(path.resolve()), str(path))) from error
+    except Exception as error:  # whatever a reader meets in a damaged file
+        raise Unreadable(f"'{path}' could not be read: {_why(error)}") from error
     finally:
-        found = [Imported(path, obj.name, obj) for obj in bpy.data.objects if obj not in before]
-        for imported in found:
-            if imported.name in before.values():
-                imported.obj.name = f"{imported.name}.001"
-        for obj, name in before.items():
+        found = [Imported(path, obj.name, obj) for obj in objects]
+        given = set(local.values())
+        twins = [x for x in found if x.obj.library is None and x.name in given]
+        for number, imported in enumerate(twins):
+            imported.obj.name = f".mobius-twin-{number}"
+        for obj, name in local.items():
             obj.name = name
+        for imported in twins:
+            imported.obj.name = imported.name  # Blender adds a number
     bpy.context.view_layer.update()
-    meshes = [replace(x, joined=form.join(x.obj.data)) for x in found if x.obj.type == "MESH"]
-    if not meshes:
-        raise Unreadable(f"'{path}' holds no mesh")
-    return sorted(meshes, key=lambda imported: imported.name)
+    return found
+
+
+def _why(error: Exception) -> str:
+    """Return why a reader failed."""
+    message = first_message(error)
+    return f"it does not hold what its kind of file does ({message})" if is_traceback(error) else message
+
+
+def require_readable(path: Path) -> None:
+    """Raise `Unreadable` if there is no file, or nothing in it, or it is not sound; see `headers.require_sound`."""
+    try:
+        if not path.is_file():
+            raise Unreadable(f"'{path}' is not a file" if path.exists() else f"there is no file '{path}'")
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise Unreadable(f"'{path}' is empty")
+    except OSError as error:
+        raise Unreadable(f"'{path}' cannot be read: {error.strerror}") from error
+    require_sound(path)
+
+
+def scans(path: Path, found: list[Imported]) -> list[Imported]:
+    """Return the mesh objects of a file, in alphabetical order, without the shapes that bones are drawn with.
+
+    Of a linked object with the name of one of the file's own, the own is meant.
+
+    Raises
+    ------
+    Unreadable
+        There is none.
+    """
+    shapes = {
+        bone.custom_shape
+        for imported in found
+        if imported.obj.type == "ARMATURE" and imported.obj.pose is not None
+        for bone in imported.obj.pose.bones
+    }
+    meshes: dict[str, Imported] = {}
+    for imported in sorted(found, key=lambda x: (x.name, x.obj.library is not None)):
+        if imported.obj.type == "MESH" and imported.obj not in shapes:
+            meshes.setdefault(imported.name, imported)
+    if not any(len(x.obj.data.vertices) for x in meshes.values()):
+        raise Unreadable(f"'{path}' holds no mesh{_what_is_missing()}")
+    return list(meshes.values())
+
+
+def _what_is_missing() -> str:
+    """Return which linked files are not there, to be added to a sentence about what was not found."""
+    names = missing_libraries()
+    return f"; it links {', '.join(map(repr, names))}, which cannot be found" if names else ""
 
 
 def import_mesh(argument: str) -> Imported:
@@ -98,26 +175,53 @@ def import_mesh(argument: str) -> Imported:
     Raises
     ------
     Unreadable
-        As `import_meshes`; or the object is not there, or the file has several and none is named.
+        As `import_meshes` and `choose`.
     """
     path, wanted = split_object_name(argument)
-    return choose(path, wanted, import_meshes(path))
+    return choose(import_meshes(path), path, wanted)
 
 
-def choose(path: Path, wanted: str | None, meshes: Sequence[Imported]) -> Imported:
-    """Return the one of a file's meshes that is named, or the only one.
+def choose(meshes: list[Imported], path: Path, wanted: str | None) -> Imported:
+    """Return the one of a file's meshes that is named; without a name its only one, or its only one not linked.
 
     Raises
     ------
     Unreadable
-        It is not there, or there are several and none is named.
+        It is not there, or there are several and none is named, or its vertices are at no place.
     """
-    listed = ", ".join(f"'{imported.name}'" for imported in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
-    if wanted is not None:
-        for imported in meshes:
-            if imported.name == wanted:
-                return imported
-        raise Unreadable(f"'{path}' has no mesh object named '{wanted}': it has {listed}")
-    if len(meshes) > 1:
-        raise Unreadable(f"'{path}' has {len(meshes)} mesh objects ({listed}): name one as {path}:NAME")
-    return meshes[0]
+    found = chosen(meshes, path, wanted)
+    if len(found) > 1:
+        own = [x for x in found if x.obj.library is None]
+        found = own if len(own) == 1 else found
+    if len(found) > 1:
+        raise Unreadable(f"'{path}' has {len(found)} mesh objects ({_listed(found)}): name one as {path}:NAME")
+    require_places(found[0])
+    return found[0]
+
+
+def chosen(meshes: list[Imported], path: Path, wanted: str | None) -> list[Imported]:
+    """Return the one mesh of a file that has a name; all without it.
+
+    Raises
+    ------
+    Unreadable
+        None has it.
+    """
+    if wanted is None:
+        return meshes
+    for imported in meshes:
+        if imported.name == wanted:
+            return [imported]
+    missing = _what_is_missing()
+    raise Unreadable(f"'{path}' has no mesh object named '{wanted}': it has {_listed(meshes)}{missing}")
+
+
+def _listed(meshes: list[Imported]) -> str:
+    return ", ".join(f"'{imported.name}'" for imported in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
+
+
+def require_places(imported: Imported) -> None:
+    """Raise `Unreadable` if a vertex is at no place."""
+    places = foreach(imported.obj.data.vertices, "co", 3, np.float32)
+    if (wrong := np.flatnonzero(~np.isfinite(places).all(axis=1))).size:
+        raise no_numbers(imported.path, wrong.size, f"vertex {wrong[0]:,} of '{imported.name}'")

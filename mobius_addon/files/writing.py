@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 
+from ..attributes import forget_written
 from ..mesh_data import Refusal
 from ..streams import quiet
 from .contents import Contents, contents_of, losses
@@ -49,6 +50,7 @@ def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: 
         export_mesh(obj, path)
         _require_whole(path, obj.name)
         return _newer(final)
+    forget_written(obj.data)  # a property that is of no use there
     before = contents_of(obj)
     export_mesh(obj, path, real_place(final).parent)
     lost = losses(before, _read_again(path, before))

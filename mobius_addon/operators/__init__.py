@@ -2,8 +2,21 @@
 
 import bpy
 
+from .. import viewport
 from ..registration import register_factory
-from . import align, check, conformal_transfer, discs, flatten, heat_map, select_unmatched, side_by_side, swap, transfer
+from . import (
+    align,
+    check,
+    clear,
+    conformal_transfer,
+    discs,
+    flatten,
+    heat_map,
+    select_unmatched,
+    side_by_side,
+    swap,
+    transfer,
+)
 
 _register, _unregister = register_factory(
     (
@@ -18,6 +31,7 @@ _register, _unregister = register_factory(
         discs.MOBIUS_OT_show_discs,
         side_by_side.MOBIUS_OT_side_by_side,
         side_by_side.MOBIUS_OT_end_side_by_side,
+        clear.MOBIUS_OT_clear,
     )
 )
 
@@ -25,6 +39,7 @@ _register, _unregister = register_factory(
 @bpy.app.handlers.persistent
 def _forget(*_: object) -> None:
     align.forget_last()
+    viewport.forget_shading()
 
 
 def register() -> None:
@@ -36,5 +51,5 @@ def register() -> None:
 def unregister() -> None:
     """Undo `register`."""
     bpy.app.handlers.load_post.remove(_forget)
-    align.forget_last()
+    _forget()
     _unregister()

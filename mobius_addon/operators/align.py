@@ -15,10 +15,10 @@ from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
-from ..mesh_data import Refusal, Surface, read_surface, scale_warning
+from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
-from ..usable import why_not_pair
+from ..usable import by_uid, why_not_pair
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +46,12 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         default=False,
         options={"SKIP_SAVE"},
     )
-    properties: Any
     surfaces: tuple[Surface, Surface]
 
     def begin(self, context: bpy.types.Context, source: bpy.types.Object, target: bpy.types.Object) -> Work:
         """Read both meshes, and return the work that gives their `Aligned`."""
         self._names = source.name, target.name
+        self.objects_read = source.session_uid, target.session_uid
         self.surfaces = surfaces = read_surface(source), read_surface(target)
         limit = self.time_limit
         if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
@@ -61,17 +61,23 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         options = replace(align_settings(self, limit, outer), take_rival=self.take_rival)
         largest_part = self.largest_part
         pairs = landmarks.from_scene(source, target, meshes, self.landmarks)
-        asked = surfaces[0].fingerprint(), surfaces[1].fingerprint(), options, largest_part, pairs.tobytes()
+        self._asked = meshes[0].fingerprint, meshes[1].fingerprint, options, largest_part, pairs.tobytes()
+        found, repeated = _last.get(self._asked), self.options.is_repeat
 
         def work(report: Report) -> Aligned:
-            found = _last.get(asked)
-            if found is None:
-                found = Aligned(*aligned(*meshes, options, largest_part=largest_part, landmarks=pairs, progress=report))
-                _last.clear()
-                _last[asked] = found
-            return found
+            if found is not None:
+                return found
+            if repeated:  # the window would be frozen
+                text = rpt_("The result of '{}' is not known any more: call it again")
+                raise Refusal(text.format(rpt_(self.job_title)))
+            return Aligned(*aligned(*meshes, options, largest_part=largest_part, landmarks=pairs, progress=report))
 
         return work
+
+    def remember(self, done: Aligned) -> None:
+        """Keep the result in case the same is asked again, as the redo panel does."""
+        _last.clear()
+        _last[self._asked] = done
 
     def objects(self) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Return source and target, if they are still what was read.
@@ -82,13 +88,13 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
             They are not.
         """
         found = []
-        for name, surface in zip(self._names, self.surfaces, strict=True):
-            obj = bpy.data.objects.get(name)
+        for uid, name, surface in zip(self.objects_read, self._names, self.surfaces, strict=True):
+            obj = by_uid(bpy.data.objects, uid)
             if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
                 raise Refusal(
                     rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name)
                 )
-            if read_surface(obj).fingerprint() != surface.fingerprint():
+            if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
                 raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
             found.append(obj)
@@ -102,13 +108,14 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
 
     def announce(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
         """Report an alignment."""
-        for warning in [scale_warning(source), scale_warning(target), *done.alignment.warnings]:
+        for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, warning)
         self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))
 
 
-# a cache, never the truth: it can be emptied at any time
+# a cache, never the truth: it can be emptied at any time. By fingerprints of both meshes and all that was asked; arrays
+# alone, nothing of Blender's
 _last: dict[Any, Aligned] = {}
 
 
@@ -129,7 +136,7 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that can be written."""
-        reason = why_not_pair(context.scene.mobius, context.scene, writes_source=True) or why_busy()
+        reason = why_not_pair(context, writes_source=True) or why_busy()
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -143,6 +150,7 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result: Aligned) -> None:
         """Write on both meshes, if they are still what was read."""
+        self.remember(result)
         pair = self.objects()
         self.keep(*pair, result)
         self.announce(*pair, result)

@@ -1,5 +1,6 @@
 """Say what a mesh is, and select what keeps it from being a disc."""
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -66,11 +67,11 @@ class MOBIUS_OT_check(bpy.types.Operator):
             return {"FINISHED"}
         trouble = troubled_vertices(mesh, found)
         if self.select and trouble.any() and obj.data.is_editable:
-            select_vertices(obj.data, trouble)
+            hidden = select_vertices(obj.data, trouble)
             context.tool_settings.mesh_select_mode = (True, False, False)
-            if self.edit:
-                viewport.edit(context, obj)
-            line += f" ({int(trouble.sum()):,} vertices are selected: see them in Edit Mode)"
+            unseen = viewport.edit(context, obj) if self.edit else None
+            line += f" ({int(trouble.sum()) - hidden:,} vertices are selected: see them in Edit Mode)"
+            tell_unseen(self.report, obj.name, hidden, unseen)
         self.report({"WARNING"}, line)
         return {"FINISHED"}
 
@@ -103,8 +104,16 @@ def outside_largest_part(mesh: TriangleMesh) -> Booleans:
     return used & (label != np.argmax(np.bincount(label[used])))
 
 
-def select_vertices(mesh: bpy.types.Mesh, chosen: Booleans) -> None:
-    """Select exactly these vertices, (n,), and the edges and polygons that lie among them."""
+def select_vertices(mesh: bpy.types.Mesh, chosen: Booleans) -> int:
+    """Select exactly these vertices, (n,), and the edges and polygons that lie among them.
+
+    Returns
+    -------
+    int
+        How many of them are hidden in Edit Mode and are left out, as Blender's own tools do.
+    """
+    hidden = chosen & foreach(mesh.vertices, "hide", 1, np.bool_)
+    chosen = chosen & ~hidden
     mesh.vertices.foreach_set("select", chosen)
     edges = foreach(mesh.edges, "vertices", 2, np.int32)
     mesh.edges.foreach_set("select", chosen[edges].all(axis=1))
@@ -112,3 +121,12 @@ def select_vertices(mesh: bpy.types.Mesh, chosen: Booleans) -> None:
     starts = foreach(mesh.polygons, "loop_start", 1, np.int32)
     mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corners], starts))
     mesh.update()
+    return int(hidden.sum())
+
+
+def tell_unseen(report: Callable[[set[str], str], None], name: str, hidden: int, unseen: str | None) -> None:
+    """Report why some of what was found cannot be seen in Edit Mode: hidden vertices, or the sentence on the object."""
+    if unseen:
+        report({"WARNING"}, unseen)
+    if hidden:
+        report({"WARNING"}, f"'{name}' has {hidden:,} more that are hidden: reveal them in Edit Mode (Alt H)")

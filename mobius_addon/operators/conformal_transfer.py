@@ -12,7 +12,7 @@ from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..jobs import Report, Work, why_busy
 from ..mesh_data import Refusal, read_surface
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, TransferOptions, draw_transfer, transfer_settings
-from ..usable import why_not, why_not_two
+from ..usable import by_uid, why_not, why_not_mode, why_not_two
 from .align import Aligned, AlignOperator
 from .transfer import read_through, tell
 
@@ -36,7 +36,7 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Take what was chosen in the panel, where the caller says nothing else."""
         for name in (*ALIGN_OPTIONS, *SCAN_OPTIONS, *TRANSFER_OPTIONS):
-            if not self.properties.is_property_set(name, ghost=False):
+            if not self.properties.is_property_set(name):  # what Blender remembers of the last time counts as not set
                 setattr(self, name, getattr(context.scene.mobius, name))
         return self.execute(context)
 
@@ -68,6 +68,8 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
 
     def finish(self, context: bpy.types.Context, result: Aligned | Correspondence) -> None:
         """Carry the data through the correspondence, then write both; if either fails, nothing is written."""
+        if isinstance(result, Aligned):
+            self.remember(result)
         source, target = self.objects()
         found = result.correspondence if isinstance(result, Aligned) else result
         settings = transfer_settings(self)
@@ -79,7 +81,8 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
         if isinstance(result, Aligned):
             self.announce(source, target, result)
         tell(self.report, target.name, source.name, plan)
-        context.scene.mobius.source, context.scene.mobius.target = source, target
+        if (scene := by_uid(bpy.data.scenes, self._scene)) is not None:
+            scene.mobius.source, scene.mobius.target = source, target
 
 
 def _pair(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object]:
@@ -96,4 +99,4 @@ def _why_not(context: bpy.types.Context) -> str | None:
     source, target = _pair(context)
     scene = context.scene
     reason = why_not(source, "source mesh", scene) or why_not(target, "target mesh", scene)
-    return reason or why_not_two(source, target)
+    return reason or why_not_two(source, target) or why_not_mode(context)

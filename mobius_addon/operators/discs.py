@@ -17,7 +17,7 @@ class MOBIUS_OT_show_discs(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow in a window, for two meshes that have been aligned."""
-        reason = why_not_aligned(context.scene.mobius, context.scene, writes=False)
+        reason = why_not_aligned(context, writes_target=False)
         if bpy.app.background:
             reason = rpt_("Blender runs without a window")
         if reason:

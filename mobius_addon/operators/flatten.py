@@ -11,7 +11,7 @@ from ..heat_maps import DISC_MEASURES, measure
 from ..mesh_data import Refusal, read_surface
 from ..options import ScanOptions, outer_vertex, repair
 from ..results import require_room, write_color, write_layout
-from ..usable import why_not
+from ..usable import why_not, why_not_mode
 
 
 class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
@@ -43,7 +43,7 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for a mesh in Object Mode that can be written."""
-        if reason := why_not(context.object, "mesh", context.scene):
+        if reason := why_not(context.object, "mesh", context.scene) or why_not_mode(context):
             cls.poll_message_set(reason)
             return False
         return True

@@ -30,7 +30,7 @@ class MOBIUS_OT_heat_map(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned."""
-        reason = why_not_aligned(context.scene.mobius, context.scene)
+        reason = why_not_aligned(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason

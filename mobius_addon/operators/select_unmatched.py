@@ -11,7 +11,7 @@ from ..attributes import mask_weights, unmatched_vertices
 from ..mesh_data import Refusal, foreach, read_surface
 from ..options import SourceMaskOptions, source_mask
 from ..usable import why_not_aligned
-from .check import select_vertices
+from .check import select_vertices, tell_unseen
 
 
 class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
@@ -34,7 +34,7 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned."""
-        reason = why_not_aligned(context.scene.mobius, context.scene)
+        reason = why_not_aligned(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -52,10 +52,10 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
         chosen = unmatched
         if self.extend:
             chosen = unmatched | foreach(target.data.vertices, "select", 1, np.bool_)
-        select_vertices(target.data, chosen)
+        hidden = select_vertices(target.data, chosen)
         context.tool_settings.mesh_select_mode = (True, False, False)
-        if self.edit and chosen.any():
-            viewport.edit(context, target)
+        unseen = viewport.edit(context, target) if self.edit and chosen.any() else None
+        tell_unseen(self.report, target.name, hidden, unseen)
         number = plural(int(unmatched.sum()), "vertex")
         share = surfaces[1].mesh.vertex_areas[unmatched].sum() / surfaces[1].mesh.area
         verb = "has" if unmatched.sum() == 1 else "have"

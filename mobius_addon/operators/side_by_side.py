@@ -11,9 +11,9 @@ from ...solver import MeshError
 from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
-from ..mesh_data import Refusal, foreach, read_surface
+from ..mesh_data import Refusal, read_surface, seen_positions
 from ..results import pattern_color, read_layout, require_room, write_color
-from ..usable import why_not, why_not_aligned
+from ..usable import why_not_aligned
 
 COLLECTION = "Mobius Side by Side"
 
@@ -31,8 +31,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned."""
-        settings, scene = context.scene.mobius, context.scene
-        reason = why_not(settings.source, "source mesh", scene) or why_not_aligned(settings, scene)
+        reason = why_not_aligned(context, writes_source=True)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -111,9 +110,20 @@ def is_shown(context: bpy.types.Context) -> bool:
 
 def end(context: bpy.types.Context) -> None:
     """Remove the copies, if there are any; the meshes stay."""
-    if not is_shown(context):
-        return
-    collection = bpy.data.collections[COLLECTION]
+    if is_shown(context):
+        _remove(context.scene.collection.children[COLLECTION])
+
+
+def end_for(mesh: bpy.types.Mesh) -> bool:
+    """Remove the copies from every scene that shows this mesh side by side, and return whether there were any."""
+    shown = [scene.collection.children.get(COLLECTION) for scene in bpy.data.scenes]
+    found = {x for x in shown if x is not None and x.is_editable and any(obj.data == mesh for obj in x.objects)}
+    for collection in found:
+        _remove(collection)
+    return bool(found)
+
+
+def _remove(collection: bpy.types.Collection) -> None:
     for obj in list(collection.objects):
         bpy.data.objects.remove(obj)
     bpy.data.collections.remove(collection)
@@ -143,7 +153,7 @@ def _beside(first: Floats, second: Floats) -> float:
 def _world(obj: bpy.types.Object) -> Floats:
     """Return the vertices of an object in the world, (n, 3)."""
     matrix = np.array(obj.matrix_world)
-    return foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    return seen_positions(obj) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy.types.Object:
@@ -155,5 +165,6 @@ def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy
         context.scene.collection.children.link(collection)
     copy = bpy.data.objects.new(f"{obj.name} (side by side)", obj.data)
     copy.matrix_world = matrix
+    copy.show_only_shape_key, copy.active_shape_key_index = obj.show_only_shape_key, obj.active_shape_key_index
     collection.objects.link(copy)
     return copy

@@ -26,7 +26,7 @@ from ..evaluated import Shown, evaluated
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
 from ..options import TransferOptions, draw_transfer, transfer_settings
-from ..usable import why_not, why_not_aligned
+from ..usable import by_uid, why_not, why_not_aligned
 
 
 class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
@@ -40,7 +40,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two meshes in Object Mode that have been aligned, or a source with selected others that have."""
-        reason = why_not_aligned(context.scene.mobius, context.scene) or why_busy()
+        reason = why_not_aligned(context) or why_busy()
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -62,6 +62,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
         targets = [scene.mobius.target]
         if self.carry_to == "selected":
             targets = selected_targets(context, source)
+        self.objects_read = tuple(target.session_uid for target in targets)
         self._targets: list[tuple[str, Surface]] = []
         readings: list[Reading] = []
         own = read_surface(source)
@@ -81,11 +82,11 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: Any) -> None:
         """Write on every target, if they are still what was read."""
         objects = []
-        for name, surface in self._targets:
-            obj = bpy.data.objects.get(name)
+        for uid, (name, surface) in zip(self.objects_read, self._targets, strict=True):
+            obj = by_uid(bpy.data.objects, uid)
             if obj is None or why_not(obj, "target mesh", context.scene) is not None:
                 raise Refusal(f"'{name}' was removed or is being edited since the transfer began: transfer again")
-            if read_surface(obj).fingerprint() != surface.fingerprint():
+            if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
                 raise Refusal(f"'{name}' was edited during the transfer: transfer again")
             objects.append(obj)
         pairs = list(zip(objects, result, strict=True))
@@ -147,8 +148,8 @@ def _read(
         carrier, unmatched = between(correspondence, own_surface, source)
         return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
     carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
-    # shape keys are the original's own, which has other vertices then
-    own = None if shown.origin is None else between(correspondence, own_surface, source)[0]
+    # shape keys are the original's own, in its own shape
+    own = between(correspondence, own_surface, source)[0]
     return read_transfer(
         source,
         target,

@@ -88,8 +88,11 @@ class Alignment:
 
     @property
     def rival_margin(self) -> float | None:
-        """By how much of the samples the winner beats whatever maps everything elsewhere, at least."""
-        if self.rival is None:
+        """By how much of the samples the winner beats whatever maps everything elsewhere, at least.
+
+        None if that was not looked at, or if time ran out over it: the same pair always has the same margin, or none.
+        """
+        if self.rival is None or self.rival.out_of_time or self.search.out_of_time:
             return None
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
 

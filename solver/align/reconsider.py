@@ -49,11 +49,13 @@ def reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignment
     def sure(alignment: Alignment) -> float:
         return float(alignment.confidence @ alignment.target.mesh.vertex_areas)
 
-    if matched.other is not None and matched.margin is not None and matched.mobius.reflected:
-        # what was said is of the mirrored search and its rival
+    turned = None
+    if matched.other is not None:
+        # what was said is of the one search and its rival
         said = tuple(unproved(matched.other))
-        upright = replace(matched, search=matched.other, other=matched.search, rival=None, warnings=said)
-        other = _fitting(upright, clock.part(0.0, 0.5, "reconsider"), best=True)
+        turned = replace(matched, search=matched.other, other=matched.search, rival=None, warnings=said)
+    if turned is not None and matched.margin is not None and matched.mobius.reflected:
+        other = _fitting(turned, clock.part(0.0, 0.5, "reconsider"), best=True)
         if other is not None and sure(other) > DOUBTFUL * sure(found):
             said = (
                 f"ambiguous orientation: mirrored scores {100 * matched.margin:.1f} % of the samples more, but not "
@@ -67,11 +69,19 @@ def reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignment
             )
             found = replace(found, warnings=(*found.warnings, said))
     if found.mean_confidence <= DOUBTFUL:
-        other = _fitting(matched, clock.part(0.5, 1.0, "reconsider"), best=False)
+        other = _fitting(matched, clock.part(0.5, 0.75, "reconsider"), best=False)
         if other is not None and sure(other) > sure(found):
             behind = 100 * (matched.search.value - other.value) / len(matched.source_samples)
             said = f"reconsidered: the best map does not fit; one that scores {behind:.1f} % of the samples less does"
             return replace(other, warnings=(said, *other.warnings))
+        if turned is not None and matched.margin is not None and not matched.mobius.reflected:
+            other = _fitting(turned, clock.part(0.75, 1.0, "reconsider"), best=True)
+            if other is not None and sure(other) > sure(found):
+                said = (
+                    f"reconsidered: not mirrored, which scores {100 * matched.margin:.1f} % of the samples more, does "
+                    "not fit; mirrored does"
+                )
+                return replace(other, warnings=(said, *other.warnings))
     return found
 
 

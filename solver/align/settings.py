@@ -67,5 +67,7 @@ class AlignSettings:
             raise ValueError(f"z_max must lie between 0 and 1, not {self.z_max}")
         if self.radius is not None and not 0 < self.radius < 1:
             raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
+        if self.time_limit is not None and not self.time_limit >= 0:
+            raise ValueError(f"time_limit must be a number of seconds, not {self.time_limit}")
         if not 0 < self.compatible <= 1:
             raise ValueError(f"compatible must be a share above 0 and at most 1, not {self.compatible}")

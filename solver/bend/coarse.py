@@ -1,7 +1,7 @@
 """A surface by few of its vertices: nodes spread over it, triangles between them, and how all others follow the nodes.
 
-Everything is found on the surface itself. In the disc a finger has the size of a point, and a triangulation of the
-nodes there would hang on rounding errors.
+The triangles are Delaunay in the disc, unless it is so crowded that they would hang on rounding errors: there a finger
+has the size of a point. Then they are found on the surface itself.
 """
 
 from __future__ import annotations
@@ -9,16 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import Delaunay, KDTree
 
+from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
-from ..surface.mesh import Floats, Integers, TriangleMesh
+from ..flatten.locate import TriangulatedDisc
+from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
+from ..surface.nearest import nearest_in_triangle
 from ..surface.sampling import edge_graph, thinned
 from .rotations import smooth_rotations
 
-LEADERS = 4
-"""Nodes that a vertex follows, as Sumner et al. (2007) take them."""
+CROWDED = 1e-4
+"""Distance of nodes in the disc below which it is crowded: Delaunay's test compares squares of distances, here 1e-8 and
+less, of points at a distance of 1 from the origin, which doubles hold to 1e-16."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +62,8 @@ class Coarse:
 def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     """Return about `count` nodes spread evenly over a surface, the corners of their triangles in the given order.
 
-    The triangles are dual to the regions of vertices nearest to each node, along the edges: one for each face whose
-    corners lie in three of them. On a surface with no more vertices than that, all are nodes.
+    On a surface with no more vertices than that, all are nodes. Where the disc is crowded the triangles are dual to the
+    regions of vertices nearest to each node, along the edges: one for each face whose corners lie in three of them.
     """
     mesh, used = flattening.mesh, np.flatnonzero(np.isfinite(flattening.disc.real))
     if len(used) <= count:
@@ -70,23 +74,43 @@ def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     # as dense along the boundary as inside, for a round surface
     rim = flattening.boundary[:: max(1, round(len(flattening.boundary) / (3.5 * np.sqrt(count))))]
     nodes = np.concatenate([inner[thinned(mesh.vertices[inner], np.sqrt(0.53 * mesh.area / count))], rim])
-    region = np.full(len(mesh.vertices), -1)
-    place = np.full(len(mesh.vertices), -1)
-    place[nodes] = np.arange(len(nodes))
-    _, _, nearest = dijkstra(edge_graph(mesh), indices=nodes, min_only=True, return_predecessors=True)
-    region[used] = place[nearest[used]]
+    disc = flattening.disc
+    apart = KDTree(_plane(disc[nodes])).query(_plane(disc[nodes]), k=2)[0][:, 1].min()
+    if apart > CROWDED:
+        nodes, faces = _delaunay(disc, nodes)
+        leaders, weights = TriangulatedDisc.of(disc[nodes], faces).locate(disc[used])
+        return Coarse(nodes, faces[:, order], used, faces[leaders], weights)
+    region = _regions(mesh, nodes)
     faces = _dual(region[mesh.faces])
-    held = np.zeros(len(nodes), bool)
-    held[faces] = True
-    if not held.all():  # a node between two others on a boundary may have no triangle
-        renumbered = np.cumsum(held) - 1
+    held = np.unique(faces)
+    if len(held) < len(nodes):  # a node between two others on a boundary may have no triangle
+        renumbered = np.full(len(nodes), -1)
+        renumbered[held] = np.arange(len(held))
         nodes, faces = nodes[held], renumbered[faces]
-        place[:] = -1
-        place[nodes] = np.arange(len(nodes))
-        _, _, nearest = dijkstra(edge_graph(mesh), indices=nodes, min_only=True, return_predecessors=True)
-        region[used] = place[nearest[used]]
+        region = _regions(mesh, nodes)
     leaders, weights = _leaders(mesh.vertices, nodes, faces, used, region[used])
     return Coarse(nodes, faces[:, order], used, leaders, weights)
+
+
+def _plane(points: Complexes) -> Floats:
+    return np.stack([points.real, points.imag], axis=1)
+
+
+def _delaunay(disc: Complexes, nodes: Integers) -> tuple[Integers, Integers]:
+    """Return the nodes and their Delaunay triangles in the disc, (f, 3), without slivers."""
+    faces = Delaunay(_plane(disc[nodes])).simplices.astype(np.intp)
+    turned = signed_areas(disc[nodes], faces)
+    faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]
+    held, place = np.unique(faces, return_inverse=True)
+    return nodes[held], place.reshape(-1, 3)
+
+
+def _regions(mesh: TriangleMesh, nodes: Integers) -> Integers:
+    """Return the row in `nodes` of the one nearest to each vertex, (n,), along edges; -1 at vertices in no face."""
+    _, _, nearest = dijkstra(edge_graph(mesh), indices=nodes, min_only=True, return_predecessors=True)
+    place = np.full(len(mesh.vertices), -1)
+    place[nodes] = np.arange(len(nodes))
+    return np.where(nearest >= 0, place[nearest], -1)
 
 
 def _dual(regions: Integers) -> Integers:
@@ -104,28 +128,22 @@ def _dual(regions: Integers) -> Integers:
 def _leaders(
     vertices: Floats, nodes: Integers, faces: Integers, used: Integers, region: Integers
 ) -> tuple[Integers, Floats]:
-    """Return the nodes that vertices follow, (k, l), and how much: the nearest of their region's node and those beside.
+    """Return the nodes that vertices follow, (k, 3), and how much: barycentric coordinates of the nearest point.
 
-    The weight falls with the square of the distance to 0 at the first node that is not followed.
+    Of the triangles around the node of their region, so that nothing across a gap is followed.
     """
     count = len(nodes)
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    beside = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    beside.sum_duplicates()
-    most = int(np.diff(beside.indptr).max())
-    around = np.full((count, most + 1), -1)
-    around[:, 0] = np.arange(count)
-    row = np.repeat(np.arange(count), np.diff(beside.indptr))
-    around[row, 1 + np.arange(len(row)) - beside.indptr[row]] = beside.indices
-    candidates = around[region]
-    distance = np.linalg.norm(vertices[nodes[candidates]] - vertices[used][:, None], axis=2)
-    distance[candidates < 0] = np.inf
-    nearest = np.argsort(distance, axis=1, kind="stable")[:, : LEADERS + 1]
-    chosen, distance = np.take_along_axis(candidates, nearest, 1), np.take_along_axis(distance, nearest, 1)
-    reach = np.where(np.isfinite(distance), distance, 0).max(axis=1)
-    weight = np.maximum(1 - distance / np.maximum(reach, np.finfo(float).tiny)[:, None], 0) ** 2
-    weight[:, 0] = np.maximum(weight[:, 0], np.finfo(float).eps)  # one node alone
-    chosen = np.where(chosen < 0, chosen[:, :1], chosen)[:, :LEADERS]
-    weight = np.where(np.isfinite(distance), weight, 0)[:, :LEADERS]
-    return chosen, weight / weight.sum(axis=1, keepdims=True)
+    corner = np.argsort(faces.ravel(), kind="stable")
+    first = np.searchsorted(faces.ravel()[corner], np.arange(count + 1))
+    leaders, weights = np.zeros((len(used), 3), np.intp), np.zeros((len(used), 3))
+    least = np.full(len(used), np.inf)
+    for k in range(int(np.diff(first).max())):
+        row = np.flatnonzero(first[region] + k < first[region + 1])
+        face = corner[first[region[row]] + k] // 3
+        corners = vertices[nodes[faces[face]]]
+        barycentric = nearest_in_triangle(vertices[used[row]], corners)
+        apart = np.linalg.norm(np.einsum("kv,kvd->kd", barycentric, corners) - vertices[used[row]], axis=1)
+        nearer = apart < least[row]
+        row = row[nearer]
+        leaders[row], weights[row], least[row] = faces[face[nearer]], barycentric[nearer], apart[nearer]
+    return leaders, weights

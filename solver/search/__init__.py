@@ -4,6 +4,7 @@ Branch and bound over all transformations with |z| <= z_max, ending with a bound
 arithmetic; knows points of two discs and nothing of surfaces (Le, Chin and Suter 2016).
 """
 
-from .branch_and_bound import SearchResult, search
+from .branch_and_bound import search
+from .outcome import SearchResult
 
 __all__ = ["SearchResult", "search"]

@@ -41,8 +41,10 @@ above is off by less than 2^-46 / F of itself, or of 1 if smaller; arctangents b
 and to modulus bounds is 2^-42 / F, sixteen times that; the disc of eq. 20-22, whose denominator
 `span` = F^2 - |m|^2 r^2 may cancel, gets 2^-42 (1 + its largest modulus) / span, and is not used for F < 2^-16 or
 s2 > 1 - 2^-10, where any rotation and any modulus is allowed. Arc sines of what shrinks with the cell are replaced by
-polynomials that exceed them. A bound therefore also covers what `Matching.value` counts by rounding: an image is
-computed to 2^-49 / F, less than the slack.
+polynomials that exceed them. So a bound holds for what is matched in exact arithmetic, by the discs as they were given:
+their centres and radii are off by d < 2^-47 (`mobius.hyperbolic_disc`), which moves |b| -+ e by 2 d, arg b, where an
+arc is not the full circle, by less than the slack of its half-width, and e^2 - (|b| - rho)^2 as much as 2 d does if
+added to rho: less than the slack of rho, the nearest or farthest modulus.
 """
 
 from __future__ import annotations
@@ -93,7 +95,8 @@ def enclosing_arcs(matching: Matching, centre: Complexes, half: Floats, kappa: C
     The rotations are phi = theta + Im(kappa (z - centre)): see the module's notes.
     """
     alpha, delta, near, far = images(matching.source, centre, half, kappa)
-    inner, outer = reaches(matching)
+    inner, outer = (x[matching.target] for x in reaches(matching.centres, matching.radii))
+    tangent, wide = (x[matching.target] for x in tangents(matching.centres, matching.radii))
     row, pair = np.nonzero((near[:, matching.point] <= outer) & (far[:, matching.point] >= inner))
     j = matching.point[pair]
     beta = widest_half_angle(
@@ -101,24 +104,25 @@ def enclosing_arcs(matching: Matching, centre: Complexes, half: Floats, kappa: C
         far[row, j],
         np.abs(matching.centre)[pair],
         matching.radius[pair],
-        *tangents(matching, pair),
+        tangent[pair],
+        wide[pair],
         delta[row, j] / 32,
     )
     return row, pair, np.angle(matching.centre)[pair] - alpha[row, j], delta[row, j] + beta
 
 
-def reaches(matching: Matching) -> tuple[Floats, Floats]:
-    """Return |b| - e and |b| + e of each pair, moved outward."""
-    b = np.abs(matching.centre)
-    return b - matching.radius - SLACK, b + matching.radius + SLACK
+def reaches(centre: Complexes, radius: Floats) -> tuple[Floats, Floats]:
+    """Return |b| - e and |b| + e of each disc, moved outward."""
+    b = np.abs(centre)
+    return b - radius - SLACK, b + radius + SLACK
 
 
-def tangents(matching: Matching, pair: Integers | slice = slice(None)) -> tuple[Floats, Floats]:
-    """Return the length of the tangents to a pair's disc and the half-angle between them, rounded up.
+def tangents(centre: Complexes, radius: Floats) -> tuple[Floats, Floats]:
+    """Return the length of the tangents to each disc and the half-angle between them, rounded up.
 
     The length is -1 where the disc holds the centre or comes so near to it that rounding would matter.
     """
-    b, e = np.abs(matching.centre)[pair], matching.radius[pair]
+    b, e = np.abs(centre), radius
     apart = b - e > 2.0**-16
     ratio = np.divide(e, b, out=np.ones_like(b), where=apart)
     length = np.where(apart, np.sqrt(np.maximum((b - e) * (b + e), 0)), -1)

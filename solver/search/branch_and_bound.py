@@ -1,7 +1,9 @@
 """The globally optimal Möbius transformation by branch and bound over z, with the rotation found exactly for each z.
 
 Le, Chin and Suter (2016), Algorithm 1, with the stopping rule that proves: the search ends when no cell that is left
-can hold a better value than the one in hand.
+can hold a better value than the one in hand. What is in hand counts only what is matched in exact arithmetic
+(`matching`), and no |z| that exceeds z_max in it; bounds hold for all that may be (`bounds`). So where an optimum is
+reached on the rim of a disc alone, value and bound stay apart, and the gap says so.
 """
 
 from __future__ import annotations
@@ -11,18 +13,19 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
 from ..mobius import Mobius
 from ..stages import SearchProgress
 from ..surface.mesh import Complexes, Floats, Integers
-from .kernels import kernels_for
+from .kernels import CompiledKernels, ReferenceKernels, kernels_for
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
 from .matching import Matching, matching
+from .outcome import SearchResult
+from .watch import look, watched
 
 CELLS_AT_ONCE = 64
 """Open cells taken on in one round, the best bounds first."""
@@ -37,56 +40,14 @@ FRONTIER = 1 << 18
 """Open cells, 64 bytes each, beyond which the smallest are searched first: then the search is depth first, and adds
 few more: those that one round leaves."""
 
+HANDED_OVER = 1e-3
+"""Seconds of a round from which other threads take part in the next."""
+
 NEAR = 1 / 16
 """Turns that rotations near a good one spread over."""
 
 SMALLEST_CELL = 2.0**-38
 """Half side of a cell that is not split further; what its bound leaves open is reported as a gap."""
-
-
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """The outcome of a search, complete or not.
-
-    Attributes
-    ----------
-    mobius : Mobius
-        The best transformation found.
-    value : float
-        Its Q, recomputed from the definition.
-    upper_bound : float
-        No transformation with |z| <= z_max has a larger Q.
-    certified : bool
-        value == upper_bound: the transformation is globally optimal.
-    nodes : int
-        Cells whose bound was computed.
-    seconds : float
-        Wall-clock time.
-    matches : (p, 2) int
-        A (source point, target point) pair for each matched source point.
-    cancelled : bool
-        Whether the progress callback ended the search.
-    one_to_one : float
-        The greatest weight of pairs within reach under `mobius` that share neither source nor target point.
-    kernels : str
-        What computed the bounds: "compiled" or "numpy".
-    """
-
-    mobius: Mobius
-    value: float
-    upper_bound: float
-    certified: bool
-    nodes: int
-    seconds: float
-    matches: Integers
-    cancelled: bool = False
-    one_to_one: float = 0.0
-    kernels: str = ""
-
-    @property
-    def gap(self) -> float:
-        """How much better a transformation could still be: upper_bound - value."""
-        return self.upper_bound - self.value
 
 
 def search(
@@ -101,6 +62,9 @@ def search(
     time_limit: float | None = None,
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
+    gap: float = 0.0,
+    enough: float | None = None,
+    at_least: int = 0,
 ) -> SearchResult:
     """Find the Möbius transformation that brings the greatest weight of source points into match discs of the target.
 
@@ -121,11 +85,20 @@ def search(
     reflect : bool
         Search the transformations of the conjugated source as well.
     time_limit : float, optional
-        Seconds after which the best so far is returned, with the bound proved by then.
+        Seconds after which the best so far is returned, with the bound proved by then, at most 0.2 s later.
     threads : int, optional
         At most; default: one per processor. The result does not depend on it, unless time runs out.
     progress : callable, optional
-        Called a few times a second with a `SearchProgress`; returns False to end the search.
+        Called ten times a second with a `SearchProgress`, in the calling thread; returns False to end the search, which
+        then takes 0.2 s at most.
+    gap : float
+        The search ends as soon as `upper_bound` is proved to exceed `value` by at most this share of it: within 0.005
+        of the optimum, say, which is not `certified`, but as far as it goes proved. Weights that differ by little leave
+        a last percent that takes most of the time.
+    enough : float, optional
+        The search ends as soon as it is decided whether some transformation reaches this value.
+    at_least : int
+        Cells whose bound is computed before `enough` or `gap` ends the search: what is small is finished.
 
     Returns
     -------
@@ -141,7 +114,10 @@ def search(
     -----
     Memory: some `FRONTIER` open cells of 64 bytes are kept, 16 MB. When there are more, the smallest are taken on
     instead of the best, depth first, until there are fewer. On top come 8 MB per thread for lists of pairs, and a
-    raster of the target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB.
+    raster of the target: up to 17 MB if all pairs may match, else 16 kB per source point, up to 128 MB. Pairs take
+    nothing if all may match with weight 1, else 20 bytes for each of positive weight; 2^32 are refused. While one
+    transformation is looked at, 30 MB more. Without the compiled kernels, up to 300 bytes for every pair that some
+    rotation matches, whatever its weight.
 
     Examples
     --------
@@ -157,65 +133,105 @@ def search(
         raise ValueError(f"time_limit must be a number of seconds, not {time_limit}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, not {threads}")
-    plain = matching(source, target, radius, metric=metric, weights=weights)
-    sides = [plain, plain.reflected()] if reflect else [plain]
-    return _Search(sides, z_max).run(time_limit, threads or os.cpu_count() or 1, progress)
+    if not gap >= 0:
+        raise ValueError(f"gap must be a share of the value, 0 or more, not {gap}")
+    started = time.perf_counter()
+
+    def until(value: float, bound: float, nodes: int) -> bool:
+        decided = enough is not None and (value >= enough or bound < enough)
+        return nodes >= at_least and (decided or (gap > 0 and bound <= value * (1 + gap)))
+
+    def work() -> None:
+        state.begin(matching(source, target, radius, metric=metric, weights=weights, check=state.check), reflect)
+        state.run(np.inf if time_limit is None else started + time_limit, threads or os.cpu_count() or 1)
+
+    state = _Search(float(z_max), float(np.size(source)), until)
+    deadline = None if time_limit is None else started + time_limit
+    tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
+    cancelled = watched(work, state.halt, deadline, tell)
+    return state.result(time.perf_counter() - started, cancelled)
 
 
 class _Search:
     """The state of one search: the best transformation so far, and the cells that may hold a better one."""
 
-    def __init__(self, sides: list[Matching], z_max: float) -> None:
-        self.sides, self.z_max = sides, z_max
-        self.kernels = [kernels_for(problem, z_max, SMALLEST_CELL) for problem in sides]
-        self.frontier = [whole_disc(problem.limit) for problem in sides]
+    def __init__(self, z_max: float, limit: float, until: Callable[[float, float, int], bool]) -> None:
+        self.z_max, self.until = z_max, until
+        self.halt = np.zeros(1, np.int32)
+        self.sides: list[Matching] = []
+        self.kernels: list[CompiledKernels | ReferenceKernels] = []
+        self.frontier: list[Floats] = []
         self.best, self.best_side = Mobius(), 0
-        self.value = sides[0].value(self.best)
+        self.value = 0.0
+        self.matches: Integers = np.zeros((0, 2), np.intp)
+        self.unlooked = limit  # what is not known to be impossible before there is a frontier
         self.finished_bound = -np.inf  # of cells too small to split
         self.nodes = 0
+        self.proved = 0.0, limit, 0
+        self.slow = False
+        self.ended = self.out_of_time = False
+
+    def check(self) -> None:
+        """Raise Halted if the search is called off."""
+        look(self.halt)
 
     @property
     def upper_bound(self) -> float:
         """What no transformation exceeds."""
-        return max(self.value, self.finished_bound, *(open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier))
+        tops = [open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier]
+        return float(max(self.value, self.unlooked, self.finished_bound, *tops))
 
-    def run(
-        self, time_limit: float | None, threads: int, progress: Callable[[SearchProgress], bool | None] | None
-    ) -> SearchResult:
-        """Split cells, best bound first, until none can hold a better transformation or time is up."""
-        started = reported = time.perf_counter()
-        cancelled, rounds = False, 0
+    def progress(self, seconds: float) -> SearchProgress:
+        """Return what was proved when the last round ended."""
+        return SearchProgress(*self.proved, seconds)
+
+    def result(self, seconds: float, cancelled: bool) -> SearchResult:
+        """Return the outcome, wherever the search has been called off."""
+        upper, best = self.upper_bound, self.best
+        return SearchResult(
+            mobius=best,
+            value=self.value,
+            upper_bound=upper,
+            certified=upper == self.value,
+            nodes=self.nodes,
+            seconds=seconds,
+            matches=self.matches,
+            cancelled=cancelled,
+            out_of_time=self.out_of_time or not (self.ended or cancelled),
+            kernels=self.kernels[0].name if self.kernels else "",
+            counted=(self.sides[self.best_side], Mobius(best.z, best.theta)) if self.sides else None,
+        )
+
+    def begin(self, plain: Matching, reflect: bool) -> None:
+        """Set up what the search needs."""
+        self.sides = [plain, plain.reflected()] if reflect else [plain]
+        self.unlooked = plain.limit
+        self.value, self.matches = plain.evaluated(self.best, self.check)
+        self.kernels = [kernels_for(plain, self.z_max, SMALLEST_CELL, self.halt)]
+        if reflect:
+            self.kernels.append(self.kernels[0].reflected())
+        self.frontier = [whole_disc(problem.limit) for problem in self.sides]
+        self.unlooked = -np.inf
+
+    def run(self, deadline: float, threads: int) -> None:
+        """Split cells, best bound first, until none can hold a better transformation, it is enough, or time is up."""
+        rounds = 0
         # bounds per open cell and round: few at first, as the best bounds lead to a good value; more later, so that a
         # long search does not spend its time here
         most = int(np.clip(2**14 // len(self.sides[0].source), 8, 256))
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
             # cells that ended undecided may turn out worthless: another may yet reach their bound
             while any(map(len, self.frontier)):
-                now = time.perf_counter()
-                if time_limit is not None and now - started > time_limit:
+                self.proved = self.value, self.upper_bound, self.nodes
+                if self.until(*self.proved):
                     break
-                if progress is not None and now - reported > 0.1:
-                    reported = now
-                    if progress(SearchProgress(self.value, self.upper_bound, self.nodes, now - started)) is False:
-                        cancelled = True
-                        break
+                if time.perf_counter() > deadline:
+                    self.out_of_time = True
+                    break
+                self.check()
                 self._round(min(8 << rounds // 32, most), pool)
                 rounds += 1
-        problem = self.sides[self.best_side]
-        plain = Mobius(self.best.z, self.best.theta)
-        upper = self.upper_bound
-        return SearchResult(
-            mobius=self.best,
-            value=self.value,
-            upper_bound=upper,
-            certified=bool(upper == self.value),
-            nodes=self.nodes,
-            seconds=time.perf_counter() - started,
-            matches=problem.matches(plain),
-            cancelled=cancelled,
-            one_to_one=one_to_one(problem, plain),
-            kernels=self.kernels[0].name,
-        )
+        self.ended = True
 
     def _round(self, budget: int, pool: ThreadPoolExecutor | None) -> None:
         """Take the best open cells off the frontier, search in each for a while, and put back what is left of them."""
@@ -233,8 +249,8 @@ class _Search:
             if len(cells) == 0:
                 continue
             left = self._expanded(side, cells[np.argsort(-cells[:, BOUND], kind="stable")], budget, pool)
-            self._improve(side, left)
             self.frontier[side] = np.concatenate([open_[~chosen], left])
+            self._improve(side, left)
         for side, open_ in enumerate(self.frontier):
             alive = open_[open_[:, BOUND] > self.value]
             ended = alive[:, HALF] <= SMALLEST_CELL
@@ -245,8 +261,11 @@ class _Search:
         """Return what is left of cells after splitting each for a while; the threads share the work."""
         kernels, value = self.kernels[side], self.value
         shares = [cells[k::SHARES] for k in range(min(SHARES, len(cells)))]
-        run = pool.map if pool else map
+        begun = time.perf_counter()
+        run = pool.map if pool and self.slow else map
         parts = list(run(lambda share: kernels.expand(share, value, budget), shares))
+        # what is done sooner than it is handed over is not handed over
+        self.slow = time.perf_counter() - begun > HANDED_OVER
         self.nodes += sum(spent for _, spent in parts)
         return np.concatenate([left for left, _ in parts])
 
@@ -268,6 +287,7 @@ class _Search:
         step = float(inside[:, HALF].max())
         ring: Complexes = np.exp(2j * np.pi * np.arange(8) / 8)
         while step > 1e-4:
+            self.check()
             around: Complexes = z + step * (1 - abs(z) ** 2) * ring
             around = around[np.abs(around) <= self.z_max]
             near = np.tile([theta / (2 * np.pi) - 0.5 * NEAR, NEAR], (len(around), 1))
@@ -277,21 +297,16 @@ class _Search:
                 z, value, theta = complex(around[k]), float(values[k]), float(rotations[k])
             else:
                 step /= 2
-        found = Mobius(z, theta)
-        value = self.sides[side].value(found)
-        if value > self.value:
-            self.value, self.best_side = value, side
+        self._offer(side, Mobius(z, theta))
+
+    def _offer(self, side: int, found: Mobius) -> None:
+        """Take a transformation if it is better, and within the bound on |z| to its last digit."""
+        value, matches = self.sides[side].evaluated(found, self.check)
+        if value > self.value and within(found.z, self.z_max):
+            self.value, self.matches, self.best_side = value, matches, side
             self.best = Mobius(found.z, found.theta, side == 1)
 
 
-def one_to_one(problem: Matching, mobius: Mobius) -> float:
-    """Return the greatest weight of pairs within reach that share neither source nor target point."""
-    hits = problem.hits(mobius)
-    j, k = problem.point[hits], problem.target[hits]
-    if len(hits) == 0:
-        return 0.0
-    rows, row = np.unique(j, return_inverse=True)
-    columns, column = np.unique(k, return_inverse=True)
-    table = np.zeros((len(rows), len(columns)))
-    table[row, column] = problem.weight[hits]
-    return float(table[linear_sum_assignment(table, maximize=True)].sum())
+def within(z: complex, z_max: float) -> bool:
+    """Return whether |z| <= z_max, exactly."""
+    return Fraction(z.real) ** 2 + Fraction(z.imag) ** 2 <= Fraction(z_max) ** 2

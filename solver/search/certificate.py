@@ -17,21 +17,18 @@ and Q in the box is at most the sum over source points of the largest weight of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import isqrt
 
 import numpy as np
 import numpy.typing as npt
 
 from ..mobius import Mobius
 from ..surface.mesh import Booleans, Complexes, Floats
+from .rational import exactly, root_up, sides, square, turn
 
 MARGIN = 2.0**-40
 """More than any rounding below: numbers of at most 8 after fewer than 100 operations are off by less than 2^-43."""
-
-BITS = 160
-"""Of the fixed-point numbers that stand for exp(i theta)."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +42,16 @@ class Certificate:
     possible : float
         The weight that it matches if every pair too close to call (within 2^-100) is counted.
     value_holds : bool
-        Whether the claimed value lies between these, up to the rounding of weights (half a unit, see `Matching.unit`).
+        Whether the claimed value lies between these, up to the rounding of weights (half a unit, see `Matching.unit`),
+        by a transformation of those that were searched: |z| <= z_max, and reflected only where that was allowed.
     bound_holds : bool or None
         Whether no transformation was shown to exceed the claimed upper bound: True if proved over the whole domain,
-        False if the boxes ran out before. None if not asked for.
+        False if the boxes ran out before, and if the bound is no finite number or below what `mobius` certainly
+        reaches. None if not asked for.
     boxes : int
         Boxes of the final cover.
+    objections : tuple of str
+        What speaks against the claim, a sentence each; what only has not been proved is none.
     """
 
     value: float
@@ -58,11 +59,15 @@ class Certificate:
     value_holds: bool
     bound_holds: bool | None = None
     boxes: int = 0
+    objections: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
-    """Every pair of positive weight, as given: nothing is converted or rounded."""
+    """Every pair of positive weight, as given: nothing is converted or rounded.
+
+    But points up to 1e-12 outside of the circle are moved onto it, by the rule of the search.
+    """
 
     point: npt.NDArray[np.intp]
     m: Complexes
@@ -110,43 +115,110 @@ def certify(
     most_boxes : int
         Give up beyond this many boxes.
 
+    Raises
+    ------
+    ValueError
+        The input is none that can be searched: wrong shapes, an unknown metric, anything not finite or out of range;
+        the text names which. What is wrong with the claim itself is among the `objections`.
+
     Examples
     --------
     >>> certify(Mobius(), 1.0, 1.0, [0.5], [0.5], 0.1).value_holds
     True
     """
-    m = np.asarray(source, np.complex128)
-    b = np.asarray(target, np.complex128)
-    table = np.ones((len(m), len(b))) if weights is None else np.asarray(weights, np.float64)
-    j, k = np.nonzero(table > 0)
-    tau = np.broadcast_to(np.asarray(radius, np.float64), b.shape)
-    pairs = _Pairs(j, m[j], b[k], tau[k], table[j, k], metric == "hyperbolic", len(m))
+    pairs, rounding = _checked(source, target, radius, metric, weights, z_max)
     low, high = _value(pairs, mobius)
+    objections = _outside(mobius, z_max, reflect)
+    inside = not objections
+    for name, number in (("value", value), ("upper bound", upper_bound)):
+        if not np.isfinite(number):
+            objections.append(f"the {name} is not a finite number: {number}")
+    reached = bool(low - rounding <= value <= high + rounding)  # nan is not
+    if np.isfinite(value) and not reached:
+        objections.append(f"the transformation matches {low if low == high else f'{low} to {high}'}, not {value}")
+    below = bool(upper_bound + rounding < low) and inside
+    if below:
+        objections.append(f"the upper bound {upper_bound} is below the {low} that the transformation matches")
+    bounded = False if below or not np.isfinite(upper_bound) else None
+    boxes = 0
+    if prove and bounded is None:
+        bounded, boxes = _proved(pairs, upper_bound + rounding, z_max, reflect, exact, most_boxes)
+    return Certificate(low, high, inside and reached, bounded, boxes, tuple(objections))
+
+
+def _checked(
+    source: npt.ArrayLike,
+    target: npt.ArrayLike,
+    radius: npt.ArrayLike,
+    metric: str,
+    weights: npt.ArrayLike | None,
+    z_max: float,
+) -> tuple[_Pairs, float]:
+    """Return the pairs, and by how much the search may round their sum; raise ValueError if nothing can be searched."""
+    m, b = (np.asarray(points, np.complex128) for points in (source, target))
+    tau = np.asarray(radius, np.float64)
+    for name, points in (("source", m), ("target", b)):
+        if points.ndim != 1 or len(points) == 0:
+            raise ValueError(f"the {name} must be a flat, non-empty array, not of shape {points.shape}")
+        if not np.isfinite(points).all() or (np.abs(points) > 1 + 1e-12).any():
+            raise ValueError(f"the {name} must be finite points of the unit disc")
+    m, b = (points / np.maximum(np.abs(points), 1) for points in (m, b))
+    if tau.shape not in ((), b.shape):
+        raise ValueError(f"radius must be one number or one per target point, not of shape {tau.shape}")
+    if not (np.isfinite(tau).all() and (tau > 0).all()):
+        raise ValueError("every radius must be a finite number above 0")
+    if metric not in ("hyperbolic", "euclidean"):
+        raise ValueError(f"unknown metric '{metric}': use 'hyperbolic' or 'euclidean'")
+    if metric == "hyperbolic" and not (tau < 1).all():
+        raise ValueError("a hyperbolic radius must be below 1")
+    if metric == "hyperbolic" and any(square(exactly(x)) >= 1 for x in b.tolist()):
+        raise ValueError("hyperbolic match discs need target points inside the unit circle")
+    if not 0 < z_max < 1:  # nan is neither
+        raise ValueError(f"z_max must lie between 0 and 1, not {z_max}")
+    table = np.ones((len(m), len(b))) if weights is None else np.asarray(weights, np.float64)
+    if table.shape != (len(m), len(b)):
+        raise ValueError(f"weights must be of shape {(len(m), len(b))}, not {table.shape}")
+    if not ((table >= 0) & (table <= 1)).all():
+        raise ValueError("every weight must lie in [0, 1]")
+    j, k = np.nonzero(table)
+    tau = np.broadcast_to(tau, b.shape)
     # whole weights are not rounded by the search, others to 2^-20 or, beyond 2,047 points, coarser
-    rounding = 0.0 if np.isin(table, (0, 1)).all() else len(m) * max(2.0**-21, len(m) * 2.0**-31)
-    holds = low - rounding <= value <= high + rounding
-    if not prove:
-        return Certificate(low, high, holds)
+    rounding = 0.0 if ((table == 0) | (table == 1)).all() else len(m) * max(2.0**-21, len(m) * 2.0**-31)
+    return _Pairs(j, m[j], b[k], tau[k], table[j, k], metric == "hyperbolic", len(m)), rounding
+
+
+def _outside(mobius: Mobius, z_max: float, reflect: bool) -> list[str]:
+    """Say why a transformation is none of those that were searched."""
+    said = []
+    if not square(exactly(mobius.z)) <= Fraction(float(z_max)) ** 2:
+        said.append(f"|z| of the transformation is {abs(mobius.z)}, beyond z_max = {z_max}")
+    if mobius.reflected and not reflect:
+        said.append("the transformation is reflected, and reflections were not searched")
+    return said
+
+
+def _proved(pairs: _Pairs, bound: float, z_max: float, reflect: bool, exact: bool, most_boxes: int) -> tuple[bool, int]:
+    """Return whether nothing in the domain exceeds `bound`, and how many boxes it took to see."""
     proved, boxes = True, 0
     for conjugated in (False, True) if reflect else (False,):
-        side = _Pairs(j, np.conj(m[j]) if conjugated else m[j], b[k], tau[k], table[j, k], pairs.hyperbolic, len(m))
-        cover = _cover(side, upper_bound + rounding, z_max, most_boxes - boxes)
+        side = replace(pairs, m=np.conj(pairs.m)) if conjugated else pairs
+        cover = _cover(side, bound, z_max, most_boxes - boxes)
         if cover is None:
-            return Certificate(low, high, holds, False, most_boxes)
+            return False, most_boxes
         boxes += len(cover)
-        proved = proved and (not exact or all(_holds_exactly(side, box, upper_bound + rounding) for box in cover))
-    return Certificate(low, high, holds, proved, boxes)
+        proved = proved and (not exact or all(_holds_exactly(side, box, bound) for box in cover))
+    return proved, boxes
 
 
 def _value(pairs: _Pairs, mobius: Mobius) -> tuple[float, float]:
     """Return the weight that is matched for certain, and with every pair that is too close to call."""
-    z, u, off = _exactly(mobius.z), *_turn(mobius.theta)
+    z, u, off = exactly(mobius.z), *turn(mobius.theta)
     sure, maybe = np.zeros(len(pairs.m), bool), np.zeros(len(pairs.m), bool)
     for i, (m, b, tau) in enumerate(zip(pairs.m.tolist(), pairs.b.tolist(), pairs.tau.tolist(), strict=True)):
-        a2, b2 = _sides(_exactly(m.conjugate() if mobius.reflected else m), _exactly(b), z, u, pairs.hyperbolic)
+        a2, b2 = sides(exactly(m.conjugate() if mobius.reflected else m), exactly(b), z, u, pairs.hyperbolic)
         room = Fraction(tau) ** 2 * b2 - a2
         # both sides have |.| <= 4 and move by at most 2 |u - exp(i theta)|
-        sure[i], maybe[i] = room > 64 * off, room >= -64 * off
+        sure[i], maybe[i] = room >= 64 * off, room >= -64 * off
     low, high = pairs.worth(np.stack([sure, maybe]))
     return float(low), float(high)
 
@@ -197,70 +269,19 @@ def _holds_exactly(pairs: _Pairs, box: Floats, bound: float) -> bool:
     """Return whether a box holds at most `bound`, by rational arithmetic alone."""
     x, y, half, theta, t = (Fraction(v) for v in box.tolist())
     z = x, y
-    u, off = _turn(theta)
+    u, off = turn(theta)
     t += 2 * off  # u is off by that much, which is as if theta were
-    r = half * _root_up(Fraction(2))
+    r = half * root_up(Fraction(2))
     alive = np.ones((1, len(pairs.m)), bool)
     # only what the float arithmetic called dead can be shown dead
     for i in np.flatnonzero(~_alive(pairs, box[None])[0]).tolist():
-        m, b, tau = _exactly(complex(pairs.m[i])), _exactly(complex(pairs.b[i])), Fraction(float(pairs.tau[i]))
-        size_m, size_b = _root_up(_square(m)), _root_up(_square(b))
-        distance = _root_up(_square((m[0] - x, m[1] - y)))
+        m, b, tau = exactly(complex(pairs.m[i])), exactly(complex(pairs.b[i])), Fraction(float(pairs.tau[i]))
+        size_m, size_b = root_up(square(m)), root_up(square(b))
+        distance = root_up(square((m[0] - x, m[1] - y)))
         step = r + t * (distance + r)
-        a2, b2 = _sides(m, b, z, u, pairs.hyperbolic)
+        a2, b2 = sides(m, b, z, u, pairs.hyperbolic)
         move_b = r * size_m + (size_b * step if pairs.hyperbolic else 0)
-        reach = tau * _root_up(b2) + step + size_b * r * size_m + tau * move_b
+        reach = tau * root_up(b2) + step + size_b * r * size_m + tau * move_b
         # u itself is not exactly on the circle
         alive[0, i] = a2 <= (reach + 8 * off) ** 2
     return bool(pairs.worth(alive)[0] <= bound)
-
-
-_Exact = tuple[Fraction, Fraction]
-
-
-def _exactly(x: complex) -> _Exact:
-    return Fraction(float(x.real)), Fraction(float(x.imag))
-
-
-def _square(x: _Exact) -> Fraction:
-    return x[0] * x[0] + x[1] * x[1]
-
-
-def _times(x: _Exact, y: _Exact) -> _Exact:
-    return x[0] * y[0] - x[1] * y[1], x[0] * y[1] + x[1] * y[0]
-
-
-def _sides(m: _Exact, b: _Exact, z: _Exact, u: _Exact, hyperbolic: bool) -> tuple[Fraction, Fraction]:
-    """Return |A|^2 and |B|^2 of the module's notes."""
-    moved = _times(u, (m[0] - z[0], m[1] - z[1]))
-    product = _times((z[0], -z[1]), m)
-    facing = 1 - product[0], -product[1]
-    carried = _times(b, facing)
-    a = moved[0] - carried[0], moved[1] - carried[1]
-    if not hyperbolic:
-        return _square(a), _square(facing)
-    back = _times((b[0], -b[1]), moved)
-    return _square(a), _square((facing[0] - back[0], facing[1] - back[1]))
-
-
-def _root_up(x: Fraction) -> Fraction:
-    """Return an upper bound of the square root, off by less than 2^-60."""
-    return Fraction(isqrt((x.numerator << 120) // x.denominator) + 1, 1 << 60)
-
-
-def _turn(theta: float | Fraction) -> tuple[_Exact, Fraction]:
-    """Return exp(i theta) in rational numbers, and by how much it may be off."""
-    x = Fraction(theta)
-    one = 1 << BITS
-    angle = x.numerator * one // x.denominator
-    # the series, in fixed point: terms fall off once their number exceeds |theta|
-    real, imag, term_real, term_imag, n = one, 0, one, 0, 0
-    while term_real or term_imag:
-        n += 1
-        term_real, term_imag = -term_imag * angle // (n * one), term_real * angle // (n * one)
-        if n > 4 * abs(float(x)) + 8 and abs(term_real) <= 1 and abs(term_imag) <= 1:
-            break
-        real, imag = real + term_real, imag + term_imag
-    # every term is rounded by 2, and that grows by |theta|^n / n! <= exp |theta|
-    off = Fraction(4 * (n + 2) * int(2 ** (1.5 * abs(float(x)) + 2)), one)
-    return (Fraction(real, one), Fraction(imag, one)), off

@@ -18,6 +18,11 @@ ELSEWHERE = 0.6
 centre is 0.5, what two neighbouring hills are apart is less. Between 0.4 and 0.6 the rivals on faces and teeth are the
 same; at 0.6 they are found in half the time."""
 
+LOOKED_AT = 8192
+"""Cells that are looked at even if it is decided earlier whether a rival is good enough: a tenth of a second. Then most
+searches are over, and the rival and its margin are the best there are; a number of cells, so that they are the same on
+every machine."""
+
 
 @dataclass(frozen=True)
 class Rival:
@@ -32,12 +37,15 @@ class Rival:
         No transformation that sends every point elsewhere has a larger Q.
     matches : (k, 2) int
         As `SearchResult.matches`.
+    out_of_time : bool
+        Whether the time limit ended the search: only then do its figures depend on the machine.
     """
 
     mobius: Mobius
     value: float
     upper_bound: float
     matches: Integers
+    out_of_time: bool = False
 
 
 def best_rival(
@@ -59,21 +67,13 @@ def best_rival(
     z_max, time_limit, progress :
         As for `search`.
     enough : float, optional
-        The search ends as soon as it is decided whether a rival has this Q.
+        The search ends as soon as it is decided whether a rival has this Q, and `LOOKED_AT` cells have been.
     """
     reflected = known[0].reflected
     seen = np.conj(objective.source) if reflected else objective.source
     elsewhere = np.ones(objective.weights.shape, bool)
     for mobius in known:
         elsewhere &= hyperbolic_distance(mobius(objective.source)[:, None], objective.target) > ELSEWHERE
-    stopped = False
-
-    def decided(state: SearchProgress) -> bool | None:
-        nonlocal stopped
-        stopped = progress is not None and progress(state) is False
-        settled = enough is not None and (state.upper_bound < enough or state.value >= enough)
-        return False if stopped or settled else None
-
     found = search(
         seen,
         objective.target,
@@ -81,11 +81,13 @@ def best_rival(
         weights=np.where(elsewhere, objective.weights, 0.0),
         z_max=z_max,
         time_limit=time_limit,
-        progress=decided,
+        progress=progress,
+        enough=enough,
+        at_least=LOOKED_AT,
     )
-    if stopped:
+    if found.cancelled:
         return None
     whole = matching(seen, objective.target, objective.radius, weights=objective.weights)
     value = whole.value(found.mobius)
     mobius = replace(found.mobius, reflected=reflected)
-    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius))
+    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius), found.out_of_time)

@@ -12,6 +12,8 @@ import numpy as np
 from ..surface.mesh import Floats, Integers
 
 TURN = 2 * np.pi
+Steps = tuple[Integers, Floats, Floats]
+"""Owner (group * points + point), angle in [0, 2 pi], and rise of each step."""
 
 
 def stab(
@@ -37,12 +39,27 @@ def stab(
     rotations : (groups,) float64
         In [0, 2 pi]: the middle of a stretch where the value is attained.
     """
-    values, rotations = np.zeros(groups), np.zeros(groups)
+    return swept(*envelope(group, point, centre, half_width, weight, points), groups, points)
+
+
+def envelope(
+    group: Integers, point: Integers, centre: Floats, half_width: Floats, weight: Floats, points: int
+) -> Steps:
+    """Return the steps that the largest weight of each source point takes in each group, as theta grows.
+
+    The parameters are those of `stab`. All arcs of one point in one group must be among them.
+    """
     if len(group) == 0:
+        return np.zeros(0, np.intp), np.zeros(0), np.zeros(0)
+    return _envelope(*_unrolled(group * points + point, centre, half_width, weight))
+
+
+def swept(owner: Integers, theta: Floats, rise: Floats, groups: int, points: int) -> tuple[Floats, Floats]:
+    """Return what `stab` does, from the steps of all its source points in any order but for those of each."""
+    values, rotations = np.zeros(groups), np.zeros(groups)
+    if len(owner) == 0:
         return values, rotations
-    owner, start, stop, weight = _unrolled(group * points + point, centre, half_width, weight)
-    event_owner, event_theta, event_rise = _envelope(owner, start, stop, weight)
-    event_group = event_owner // points
+    event_group, event_theta, event_rise = owner // points, theta, rise
 
     # rises before falls at equal angles: the arcs are closed
     order = np.lexsort([event_rise < 0, event_theta, event_group])
@@ -79,7 +96,7 @@ def _unrolled(
     )
 
 
-def _envelope(owner: Integers, start: Floats, stop: Floats, weight: Floats) -> tuple[Integers, Floats, Floats]:
+def _envelope(owner: Integers, start: Floats, stop: Floats, weight: Floats) -> Steps:
     """Return owner, angle and rise of the step function max {weight : theta in interval}, per owner."""
     n = len(owner)
     theta = np.concatenate([start, stop])

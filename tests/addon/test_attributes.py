@@ -66,7 +66,9 @@ def carrier(source: Any, target: Any, bare: slice = slice(0)) -> Carrier:
 
 
 def transfer(source: Any, target: Any, kinds: list[str] = ALL, bare: slice = slice(0)) -> Transfer:
-    plan = plan_transfer(source, target, carrier(source, target, bare), TransferSettings(kinds=tuple(kinds)))
+    """Carry the kinds, in place of what has their names."""
+    settings = TransferSettings(kinds=tuple(kinds), collisions="replace")
+    plan = plan_transfer(source, target, carrier(source, target, bare), settings)
     plan.write(target)
     return plan
 

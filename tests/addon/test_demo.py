@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension import solver  # noqa: E402
-from mobius_extension.mobius_addon import demo  # noqa: E402
+from mobius_extension.mobius_addon import demo, stored_alignment  # noqa: E402
 from mobius_extension.mobius_addon.command_line import main  # noqa: E402
 from mobius_extension.mobius_addon.demo import accuracy, paint, pictures, scans  # noqa: E402
 from mobius_extension.mobius_addon.demo.paint import FACE_PAINT, GRID_UV, SMILE, face_paint, front_view  # noqa: E402
@@ -175,8 +175,9 @@ def test_the_blend_holds_the_two_scans_and_what_was_carried(finished: Path, buil
         assert {node.layer_name for node in material.node_tree.nodes if node.type == "VERTEX_COLOR"} == {FACE_PAINT}
     assert source.data.shape_keys.key_blocks[SMILE].value == 0
     kept = target.data.mobius_alignment
-    assert kept.source == source
-    assert kept.target_fingerprint == read_surface(target).fingerprint()
+    assert (kept.source, kept.source_name) == (None, "Source scan")
+    assert stored_alignment.exists(target, source)
+    assert kept.target_fingerprint == read_surface(target).mesh.fingerprint
 
 
 def test_pictures_leave_no_data_behind(built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

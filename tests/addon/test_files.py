@@ -91,8 +91,8 @@ def test_an_object_in_another_format_than_blend_can_be_named_too(tmp_path: Path)
         ("text.txt", "hello", "has an ending that is not known: use one of .blend .obj"),
         ("empty.obj", "", "is empty"),
         ("words.obj", "these are only words\n", "holds no mesh"),
-        ("words.ply", "these are only words\n", "could not be read: PLY Importer: words: Invalid PLY header"),
-        ("words.glb", "these are only words\n", "could not be read: "),
+        ("words.ply", "these are only words\n", "could not be read: it does not begin with the header of a PLY file"),
+        ("words.glb", "these are only words\n", "is cut short or damaged: its JSON ends in an error"),
         ("words.fbx", "these are only words\n", "could not be read: "),
         ("words.usda", "these are only words\n", "could not be read: "),
         ("words.blend", "these are only words\n", "could not be read: "),
@@ -135,6 +135,7 @@ def test_names_with_colons_and_files_that_exist_are_told_apart(tmp_path: Path) -
     odd = tmp_path / "odd.obj:name.obj"
     odd.write_text("")
     assert files.split_object_name(str(odd)) == (odd, None)
+    assert files.split_object_name(f"{odd}:Scan") == (odd, "Scan")
 
 
 def test_what_a_file_repeats_along_seams_is_joined_and_said(tmp_path: Path) -> None:

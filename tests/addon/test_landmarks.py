@@ -1,4 +1,4 @@
-"""Landmarks: where they come from in a scene and in a file, and that they decide."""
+"""Landmarks: where they come from in a scene, and that they decide."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 from mobius_extension.mobius_addon import landmarks  # noqa: E402
 from mobius_extension.mobius_addon.command_line import main  # noqa: E402
 from mobius_extension.mobius_addon.files import export_mesh  # noqa: E402
-from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 
 
 def even(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -96,25 +96,6 @@ def test_without_any_it_is_refused_and_nothing_changes(pair: tuple[Any, Any]) ->
     assert [everything(obj) for obj in pair] == before
 
 
-def test_a_file_names_vertices_or_places(pair: tuple[Any, Any], tmp_path: Path) -> None:
-    source, target = (read_surface(obj).mesh for obj in pair)
-    at = source.vertices[30]
-    path = tmp_path / "pairs.txt"
-    path.write_text(f"# source, target\n3, 4\n\n5 6  # a remark\n{at[0]};{at[1]};{at[2]};-1;-1;0\n")
-    found = landmarks.from_file(path, (source, target))
-    assert found[:2].tolist() == [[3, 4], [5, 6]]
-    assert found[2].tolist() == [30, int(np.linalg.norm(target.vertices - [-1, -1, 0], axis=1).argmin())]
-    for text, reason in (
-        ("1 2 3\n", "line 1: give two vertex numbers"),
-        ("1.5 2\n", "line 1: give two"),
-        ("# nothing\n", "holds no landmarks"),
-        ("1 100000\n", "names vertices that 'Target' lacks"),
-    ):
-        path.write_text(text)
-        with pytest.raises(Refusal, match=reason):
-            landmarks.from_file(path, (source, target))
-
-
 def test_on_the_command_line(pair: tuple[Any, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     quick = ["--samples", "12", "--targets", "80", "--reflect", "never", "--refine", "none"]
     rows = [
@@ -137,4 +118,4 @@ def test_on_the_command_line(pair: tuple[Any, Any], tmp_path: Path, capsys: pyte
     assert maps[0] != maps[1]
     gone = ["align", *files, *quick, "--landmarks", tmp_path / "gone.txt"]
     assert main([str(argument) for argument in gone]) == 2
-    assert "gone.txt' cannot be read" in capsys.readouterr().err
+    assert "there is no file" in capsys.readouterr().err

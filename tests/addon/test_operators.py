@@ -196,10 +196,10 @@ def test_align_tells_left_from_right_as_the_person_sees_it(pair: tuple[Any, Any]
 
 
 def test_align_stores_what_was_found_and_proved(pair: tuple[Any, Any]) -> None:
-    source, target = pair
+    _, target = pair
     bpy.ops.mobius.align(**QUICK)
     kept = target.data.mobius_alignment
-    assert kept.source == source
+    assert (kept.source_name, kept.source) == ("Source", None)
     assert kept.certified
     assert kept.upper_bound == pytest.approx(kept.value)
     assert 0 < kept.value <= QUICK["samples"]
@@ -235,9 +235,11 @@ def test_align_names_everything_that_is_wrong_with_the_choice(pair: tuple[Any, A
     bpy.context.scene.collection.objects.link(twin)
     settings.source = twin
     refused("'Twin' and 'Target' share one mesh: make one single-user first")
-    settings.source = bpy.data.objects.new("Empty", None)
+    settings.source = empty = bpy.data.objects.new("Empty", None)
+    bpy.context.scene.collection.objects.link(empty)
     refused("'Empty' is no mesh")
     settings.source = source
+    bpy.data.scenes.new("Other").collection.objects.link(source)
     bpy.context.scene.collection.objects.unlink(source)
     refused("'Source' is not in this scene")
     bpy.context.scene.collection.objects.link(source)
@@ -515,3 +517,148 @@ def test_a_refused_operator_leaves_no_undo_step() -> None:
     assert "Mobius Disc" in sheet.data.uv_layers
     bpy.ops.ed.undo()  # takes back the cube, not a step of the refused operator
     assert "Bad" not in bpy.data.objects
+
+
+# where Blender shows nothing, or another mode reigns
+
+
+def put_in_collection(obj: Any) -> Any:
+    """Move an object into a collection of its own, and return how the view layer shows that one."""
+    collection = bpy.data.collections.new("Alone")
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.scene.collection.objects.unlink(obj)
+    collection.objects.link(obj)
+    return bpy.context.view_layer.layer_collection.children["Alone"]
+
+
+UNSEEN = {
+    "excluded": lambda obj: setattr(put_in_collection(obj), "exclude", True),
+    "collection hidden": lambda obj: setattr(put_in_collection(obj), "hide_viewport", True),
+    "collection disabled": lambda obj: setattr(put_in_collection(obj).collection, "hide_viewport", True),
+    "disabled": lambda obj: setattr(obj, "hide_viewport", True),
+}
+SEEN = {
+    "hidden": lambda obj: obj.hide_set(True),
+    "unselectable": lambda obj: setattr(obj, "hide_select", True),
+    "collection unselectable": lambda obj: setattr(put_in_collection(obj).collection, "hide_select", True),
+}
+
+
+@pytest.mark.parametrize("state", [*UNSEEN, *SEEN])
+def test_what_was_found_is_selected_on_objects_that_cannot_be_seen_or_selected(state: str) -> None:
+    source, target = make_sheet("Source", 21), make_sheet("Target", 16, keep=lambda i, j: (i, j) != (5, 5))
+    bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = source, target
+    make_sheet("Bystander", 4)
+    bpy.ops.mobius.align(**QUICK)
+    target.data.mobius_alignment.packed = unmatched_at(target, [3, 4])
+    (UNSEEN | SEEN)[state](target)
+    bpy.context.view_layer.update()
+    hidden = target.hide_get()
+    for run, expected in (
+        (lambda: bpy.ops.mobius.select_unmatched(edit=True), {3, 4}),
+        (lambda: bpy.ops.mobius.check(object_name="Target", edit=True), {85, 86, 101, 102}),
+    ):
+        assert run() == {"FINISHED"}
+        assert bpy.context.mode == ("EDIT_MESH" if state in SEEN else "OBJECT")
+        if state in SEEN:
+            assert bpy.context.object == target
+            assert bpy.data.objects["Bystander"].mode == "OBJECT"
+            bpy.ops.object.mode_set(mode="OBJECT")
+        else:
+            assert target.hide_get() == hidden
+        assert {vertex.index for vertex in target.data.vertices if vertex.select} == expected
+
+
+def unmatched_at(target: Any, vertices: list[int]) -> bytes:
+    """The target's stored alignment with everything matched but these vertices."""
+    import io
+
+    with np.load(io.BytesIO(target.data.mobius_alignment.packed)) as stored:
+        arrays = dict(stored)
+    arrays["matched"] = ~np.isin(np.arange(len(arrays["matched"])), vertices)
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize("state", [*UNSEEN, *SEEN])
+@pytest.mark.parametrize("which", [0, 1])
+def test_every_operator_works_on_objects_that_cannot_be_seen_or_selected(
+    pair: tuple[Any, Any], state: str, which: int
+) -> None:
+    _, target = pair
+    (UNSEEN | SEEN)[state](pair[which])
+    bpy.context.view_layer.update()
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    assert bpy.ops.mobius.transfer() == {"FINISHED"}
+    assert np.ptp(weights(target, "Right")) > 0.9
+    assert bpy.ops.mobius.heat_map() == {"FINISHED"}
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert bpy.ops.mobius.end_side_by_side() == {"FINISHED"}
+    assert [obj.name for obj in bpy.data.objects] == ["Source", "Target"]
+
+
+def test_hidden_vertices_are_not_selected_but_told() -> None:
+    hole = make_sheet("Hole", 6, keep=lambda i, j: (i, j) != (2, 2))
+    for index in (14, 15):
+        hole.data.vertices[index].hide = True
+    assert bpy.ops.mobius.check() == {"FINISHED"}
+    assert [vertex.index for vertex in hole.data.vertices if vertex.select] == [20, 21]
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT", "WEIGHT_PAINT"])
+def test_nothing_is_written_while_another_object_is_edited(pair: tuple[Any, Any], mode: str) -> None:
+    # Blender keeps the undo steps of such a mode apart, and some writing is not possible in it
+    bpy.ops.mobius.align(**QUICK)
+    before = [everything(obj) for obj in pair]
+    make_sheet("Bystander", 4)
+    bpy.ops.object.mode_set(mode=mode)
+    for name, given in (
+        ("align", QUICK), ("transfer", {}), ("heat_map", {}), ("side_by_side", {}), ("select_unmatched", {}),
+    ):  # fmt: skip
+        with pytest.raises(RuntimeError, match="Switch to Object Mode first"):
+            getattr(bpy.ops.mobius, name)(**given)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [everything(obj) for obj in pair] == before
+
+
+def test_a_mesh_that_is_edited_through_another_object_is_refused_and_stays(pair: tuple[Any, Any]) -> None:
+    _, target = pair
+    twin = bpy.data.objects.new("Twin", target.data)
+    bpy.context.scene.collection.objects.link(twin)
+    for obj in bpy.context.scene.objects:
+        obj.select_set(False)
+    activate(twin)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert target.mode == "OBJECT"
+    with pytest.raises(RuntimeError, match="'Target' shares its mesh with an object in Edit Mode"):
+        bpy.ops.mobius.align(**QUICK)
+    with pytest.raises(RuntimeError, match="Switch to Object Mode first"):
+        bpy.ops.mobius.check(object_name="Target")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+
+
+def test_an_object_has_its_number_through_undo_redo_and_a_new_name(pair: tuple[Any, Any]) -> None:
+    # what a job that goes on meanwhile finds its objects by
+    before = [obj.session_uid for obj in pair]
+    bpy.ops.ed.undo_push(message="begin")
+    pair[0].name = "Renamed"
+    bpy.ops.ed.undo_push(message="renamed")
+    bpy.ops.ed.undo()
+    assert [bpy.data.objects[name].session_uid for name in ("Source", "Target")] == before
+    bpy.ops.ed.redo()
+    assert [bpy.data.objects[name].session_uid for name in ("Renamed", "Target")] == before
+
+
+def test_a_failure_in_edit_mode_never_removes_the_object(pair: tuple[Any, Any]) -> None:
+    from mobius_extension.mobius_addon.attributes import restored_on_failure
+
+    source, _ = pair
+    activate(source)
+    bpy.ops.object.mode_set(mode="EDIT")
+    meshes = len(bpy.data.meshes)
+    with pytest.raises(MemoryError), restored_on_failure(source):
+        raise MemoryError("no memory")
+    assert (source.name, source.mode) == ("Source", "EDIT")
+    assert len(bpy.data.meshes) == meshes

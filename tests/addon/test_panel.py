@@ -188,11 +188,13 @@ def test_the_rival_can_be_taken(pair: tuple[Any, Any]) -> None:
 def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" in said
-    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7))
+    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7), waits=None)
     monkeypatch.setattr(jobs.Job, "current", under_way)
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" not in said
     assert {"Searching", "30.0 of at most 40.0, gap 10.0", "Stop"} <= set(said)
+    under_way.waits = "'Target' has to be in Object Mode"
+    assert {"Waiting", "'Target' has to be in Object Mode", "Stop"} <= set(drawn(panel.MOBIUS_PT_main))
     for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer):
         assert not operator.poll()
     with pytest.raises(RuntimeError, match="Align is under way: press ESC to stop it"):
@@ -274,3 +276,30 @@ def test_german_covers_the_interface() -> None:
     for english, german in GERMAN.items():
         assert fields(english) == fields(german), english
         assert english.endswith(":") == german.endswith(":"), english
+
+
+# before a transfer
+
+
+def test_what_is_kept_and_replaced_is_said_above_the_button(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+    for obj in pair:
+        obj.data.materials.append(bpy.data.materials.new("Skin"))
+        for name in ("Head", "Jaw", "Eye", "Nose", "Chin"):
+            obj.vertex_groups.new(name=name).add((1, 2), 0.5, "REPLACE")
+    target.data.uv_layers.new(name="UVMap")
+    lines = drawn(panel.MOBIUS_PT_transfer)
+    assert "Stays on the target: Head, Jaw, Eye, Nose, ..." in lines
+    assert "Replaced on the target: Materials" in lines
+    assert lines.index("Replaced on the target: Materials") < lines.index("Transfer")
+    bpy.context.scene.mobius.collisions = "replace"
+    bpy.context.scene.mobius.kinds = {"UV", "MATERIALS"}
+    lines = drawn(panel.MOBIUS_PT_transfer)
+    assert "Replaced on the target: UVMap, Materials" in lines
+    assert not [line for line in lines if line.startswith("Stays")]
+    bpy.context.scene.mobius.carry_to = "selected"  # none of which is aligned
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+    bpy.context.scene.mobius.target = source
+    bpy.context.scene.mobius.carry_to = "target"
+    assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]

@@ -25,11 +25,16 @@ def sheets() -> tuple[Any, Any]:
 
 
 def carry(source: Any, target: Any, bare: Any = slice(0), **choices: Any) -> Transfer:
-    """Carry between flat sheets of the same place; target vertices `bare` correspond to nothing with certainty."""
+    """Carry between flat sheets of the same place; target vertices `bare` correspond to nothing with certainty.
+
+    In place of what has the same name, if nothing else is said.
+    """
     found = correspondence(source, positions(target))
     found.matched[bare] = False
     surfaces = read_surface(source), read_surface(target)
-    plan = read_through(source, target, surfaces, found, TransferSettings(**choices)).carry()
+    plan = read_through(
+        source, target, surfaces, found, TransferSettings(**{"collisions": "replace"} | choices)
+    ).carry()
     plan.write(target)
     return plan
 
@@ -43,7 +48,7 @@ def add_group(obj: Any, name: str, values: Any) -> None:
 
 def add_color(obj: Any, name: str, color: Any) -> None:
     layer = obj.data.color_attributes.new(name, "FLOAT_COLOR", "POINT")
-    layer.data.foreach_set("color", np.broadcast_to(color, (N * N, 4)).astype(np.float32).ravel())
+    layer.data.foreach_set("color", np.broadcast_to(color, (len(layer.data), 4)).astype(np.float32).ravel())
 
 
 def color(obj: Any, name: str) -> np.ndarray:
@@ -119,24 +124,6 @@ def test_groups_of_deforming_bones_alone(sheets: Any) -> None:
     target.modifiers.new("Rig", "ARMATURE").object = armature
     plan = carry(source, target, kinds=("vertex-groups",), deform_only=True)
     assert [x.name for x in plan.layers] == ["Head"]
-
-
-def test_a_name_that_is_taken_gets_a_number_if_both_are_to_be_kept(sheets: Any) -> None:
-    source, target = sheets
-    for obj, value in ((source, 1.0), (target, 0.25)):
-        add_group(obj, "Head", value)
-        add_color(obj, "Paint", (value, 0, 0, 1))
-        obj.data.uv_layers.new(name="UVMap")
-        for name in ("Basis", "Smile"):
-            obj.shape_key_add(name=name)
-    plan = carry(source, target, collisions="number")
-    assert {x.name for x in plan.layers} == {"Head.001", "Paint.001", "UVMap.001", "Smile.001"}
-    assert plan.warnings == ()
-    assert weights(target, "Head") == pytest.approx(0.25)
-    assert weights(target, "Head.001") == pytest.approx(1)
-    assert color(target, "Paint")[0, 0] == 0.25
-    assert target.data.shape_keys.key_blocks.keys() == ["Basis", "Smile", "Smile.001"]
-    assert carry(source, target, collisions="number", kinds=("vertex-groups",)).layers[0].name == "Head.002"
 
 
 # how values join

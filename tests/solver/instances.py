@@ -55,7 +55,7 @@ def planted(
 
 def grown(problem: Matching, factor: float) -> Matching:
     """The same problem with every radius multiplied."""
-    return dataclasses.replace(problem, radius=problem.radius * factor)
+    return dataclasses.replace(problem, radii=problem.radii * factor, given=None)
 
 
 def quadratic_best(problem: Matching, z: complex, inward: float = 1e-10) -> float:

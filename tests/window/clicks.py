@@ -9,23 +9,18 @@ and presses Ctrl C, with which Blender copies the command of the button under th
 
 import importlib
 import json
-import os
-import subprocess
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
+import hand
+import meanwhile
+import redoing
+from hand import Wait, choose, click_on, escape, find, picture, redo, undo, until
 from mathutils import Euler, Vector
 
-SHOTS = Path(os.environ["MOBIUS_SHOTS"])
-STEP = 12
-"""Pixels between places where a button is looked for; a row is twenty high."""
-
+vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
 Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
-
-Wait = Iterator[float]
 
 
 def steps() -> Wait:
@@ -85,7 +80,11 @@ def steps() -> Wait:
     yield 1.0
     assert state(bpy.data.objects[names[1]])["keys"], "redo brings the transfer back"
 
+    yield from redoing.steps(PACKAGE, names)
+    yield from meanwhile.steps(PACKAGE, names)
+
     view = bpy.context.window_manager.mobius_view
+    look = bpy.context.space_data.shading.type, bpy.context.space_data.shading.color_type
     view.matches = True
     yield from picture("matches")
     view.matches = False
@@ -105,6 +104,20 @@ def steps() -> Wait:
     yield from picture("german")
     bpy.context.preferences.view.language = "en_US"
     yield 0.5
+
+    shading = bpy.context.space_data.shading
+    assert (shading.type, shading.color_type) == ("SOLID", "VERTEX") != look
+    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    bpy.ops.mobius.clear("EXEC_DEFAULT", True)
+    yield from picture("cleared")
+    assert bpy.context.space_data.local_view is None
+    assert (shading.type, shading.color_type) == look, "the viewport looks otherwise than before"
+    assert [view.matches, view.discs, view.legend] == [False] * 3
+    for name in names:
+        found = state(bpy.data.objects[name])
+        assert not found["aligned"]
+        assert not [x for x in (*found["groups"], *(x[0] for x in found["attributes"])) if "Mobius" in x]
 
     # another file in the middle of the work
     bpy.ops.mobius.align("INVOKE_DEFAULT", samples=99)  # what was asked before is known
@@ -145,86 +158,9 @@ def state(obj: Any) -> dict[str, Any]:
     }
 
 
-def until(happened: Any, every: float = 0.1) -> Wait:
-    """Wait for something, a minute at most."""
-    end = time.monotonic() + 60
-    while not happened():
-        assert time.monotonic() < end, "nothing happened in a minute"
-        yield every
-
-
 def idle_round() -> Any:
     """Return how long the window takes to draw itself and look at its events when nothing is to be done."""
     start = time.perf_counter()
     yield 0.02
     yield 0.02
     return (time.perf_counter() - start) / 2
-
-
-def picture(name: str, wait: float = 1.2) -> Wait:
-    yield wait
-    shot(str(SHOTS / f"{name}.png"))
-
-
-# hand and eye
-
-
-def pointer(*arguments: object) -> None:
-    subprocess.run(["xdotool", *map(str, arguments)], check=True)
-
-
-def escape() -> None:
-    pointer("key", "Escape")
-
-
-def undo() -> None:
-    over_the_viewport()
-    pointer("key", "ctrl+z")
-
-
-def redo() -> None:
-    over_the_viewport()
-    pointer("key", "ctrl+shift+z")
-
-
-def over_the_viewport() -> None:
-    part = region("WINDOW")
-    pointer("mousemove", part.x + part.width // 3, screen_height() - part.y - 40)
-
-
-def screen_height() -> int:
-    return bpy.context.window.height
-
-
-def click_on(place: tuple[int, int]) -> Wait:
-    click(*place)
-    yield 0.3
-    over_the_viewport()
-
-
-def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False) -> Any:
-    """Return where the sidebar's button of a command is: move the mouse along and ask at each place."""
-    sidebar = region("UI")
-    x = sidebar.x + (sidebar.width - 24) // 2
-    top = screen_height() - (sidebar.y + sidebar.height)
-    places = range(top + 30, top + sidebar.height - 5, STEP)
-    for y in reversed(places) if upwards else places:
-        bpy.context.window_manager.clipboard = ""
-        pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", keys)
-        yield 0.1
-        if bpy.context.window_manager.clipboard.startswith(command):
-            print(f"[clicks] {command} is at {x}, {y}", flush=True)
-            return x, y
-    raise AssertionError(f"the sidebar shows nothing of {command}")
-
-
-def choose(role: str, obj: Any) -> Wait:
-    """Choose an object in a picker: click on it, type the name, confirm."""
-    place = yield from find(f'bpy.data.scenes["Scene"].mobius.{role}', "ctrl+alt+shift+c")
-    click(*place)
-    yield 0.8
-    pointer("type", "--delay", "40", obj.name)
-    yield 0.8
-    pointer("key", "Return")
-    yield 0.8
-    over_the_viewport()

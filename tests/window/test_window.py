@@ -21,6 +21,7 @@ ROOTS = Path(os.environ.get("BLENDER_ROOTS", "/opt"))
 PICTURES = (
     *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
     *("heat-map-factor", "side-by-side", "discs", "german"),
+    *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "cleared"),
 )
 
 
@@ -34,7 +35,7 @@ def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("suite", ["sid", "trixie"])
 def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     if os.environ.get("MOBIUS_WINDOW") != "1":
@@ -50,7 +51,7 @@ def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest,
         "SUITE": suite,
         "GUI_TAB": "Möbius",
         "GUI_SIZE": "1600x1300",
-        "GUI_TIMEOUT": "600",
+        "GUI_TIMEOUT": "1500",
         "MOBIUS_SHOTS": str(shots),
     }
     done = subprocess.run(

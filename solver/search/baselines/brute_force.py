@@ -8,7 +8,6 @@ the centre of the disc, a rotation.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +16,8 @@ from ...mobius import Mobius
 from ...stages import SearchProgress
 from ...surface.mesh import Complexes, Floats
 from ..bounds import exact_arcs
-from ..branch_and_bound import SearchResult
-from ..matching import Matching
+from ..matching import Matching, Rows
+from ..outcome import SearchResult
 from ..stabbing import stab
 from .incumbent import Incumbent, incumbent
 
@@ -91,7 +90,7 @@ def _anchors(best: Incumbent) -> Complexes:
 
     The transformation that moves b to the centre has its pole at 1 / conj(b), which must lie in no match disc.
     """
-    reach = float((np.abs(best.problem.centre) + best.problem.radius).max(initial=0.0))
+    reach = float((np.abs(best.problem.centres) + best.problem.radii).max(initial=0.0))
     length = np.abs(best.target)
     return best.target * np.minimum(1, (1 - 1e-9) / (np.maximum(reach, 1) * np.maximum(length, 1e-300)))
 
@@ -103,19 +102,22 @@ def _framed(best: Incumbent, points: Complexes, anchor: complex) -> Matching:
     weight is that of all others together and 1.
     """
     problem = best.problem
-    centre = np.append(problem.centre, 0)
-    radius = np.append(problem.radius, best.z_max)
+    centre = np.append(problem.centres, 0)
+    radius = np.append(problem.radii, best.z_max)
     # where x -> (x - b) / (1 - conj(b) x) carries the discs, eq. 20-22 of the paper
     facing = 1 - np.conj(anchor) * centre
     span = np.abs(facing) ** 2 - abs(anchor) ** 2 * radius**2
-    return replace(
-        problem,
+    pairs = np.append(problem.weight, np.ceil(problem.limit) + 1) / problem.unit
+    return Matching(
         source=np.append(points, 0),
-        point=np.append(problem.point, len(points)),
-        target=np.append(problem.target, -1),
-        centre=((centre - anchor) * np.conj(facing) + anchor * radius**2) / span,
-        radius=radius * (1 - abs(anchor) ** 2) / span,
-        weight=np.append(problem.weight, np.ceil(problem.limit) + 1),
+        centres=((centre - anchor) * np.conj(facing) + anchor * radius**2) / span,
+        radii=radius * (1 - abs(anchor) ** 2) / span,
+        rows=Rows(
+            np.append(problem.starts, problem.count + 1),
+            np.append(problem.target, len(problem.centres)).astype(np.int32),
+            pairs.astype(np.uint32),
+        ),
+        unit=problem.unit,
     )
 
 

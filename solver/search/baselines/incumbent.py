@@ -13,8 +13,8 @@ import numpy.typing as npt
 from ...mobius import Mobius
 from ...stages import SearchProgress
 from ...surface.mesh import Complexes, Floats
-from ..branch_and_bound import SearchResult, one_to_one
 from ..matching import Matching, matching
+from ..outcome import SearchResult
 
 
 @dataclass
@@ -91,8 +91,8 @@ class Incumbent:
             seconds=time.perf_counter() - self._started,
             matches=self.problem.matches(self.mobius),
             cancelled=self.cancelled,
-            one_to_one=one_to_one(self.problem, self.mobius),
             kernels="numpy",
+            counted=(self.problem, self.mobius),
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import importlib
 import logging
@@ -14,9 +15,11 @@ import numpy as np
 from ...surface.mesh import Complexes, Floats
 from ..bounds import reaches, tangents
 from ..matching import Matching
+from ..watch import Halt, look
+from .layout import one_row, own_rows, sector_grid, sectors
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 7
+INTERFACE = 8
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
@@ -38,14 +41,13 @@ STACK = 2048
 """Open cells of one subtree at most, as in kernels.c."""
 
 log = logging.getLogger(__name__)
-
 _I64, _F64, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
 class _Problem(ctypes.Structure):
     _fields_ = [
         ("points", _I64),
-        *((name, _POINTER) for name in ("mx", "my", "start", "stop", "pairs", "inner", "reach", "weight", "raster")),
+        *((name, _POINTER) for name in ("mx", "my", "start", "stop", "discs", "disc", "reach", "weight", "raster")),
         ("levels", _I64),
         ("planes", _I64),
         ("own", _POINTER),
@@ -57,6 +59,7 @@ class _Problem(ctypes.Structure):
         ("rings", _I64),
         ("z_max", _F64),
         ("smallest", _F64),
+        ("halt", _POINTER),
     ]
 
 
@@ -106,43 +109,55 @@ class CompiledKernels:
 
     name = "compiled"
 
-    def __init__(self, problem: Matching, z_max: float, smallest: float) -> None:
+    def __init__(
+        self,
+        problem: Matching,
+        z_max: float,
+        smallest: float,
+        halt: Halt | None = None,
+    ) -> None:
         loaded = library()
         if loaded is None:
             raise ImportError("mobius_kernels is not installed")
         self._library = loaded
         self.unit = problem.unit
         self.points = len(problem.source)
+        self.halt = np.zeros(1, np.int32) if halt is None else halt
         # about one target point in two of its sectors
-        rings = int(np.clip(2 ** np.round(0.5 * np.log2(max(len(problem.point) // self.points, 1))), 8, MOST_RINGS))
-        order, start, stop, shared = _rows(problem, rings)
-        inner, outer = (x[order] for x in reaches(problem))
-        tangent, wide = (x[order] for x in tangents(problem))
-        # the running maximum along each row: pairs before its first entry >= near cannot reach near
-        reach = outer.copy()
-        for a, b in set(zip(start.tolist(), stop.tolist(), strict=True)):
-            np.maximum.accumulate(outer[a:b], out=reach[a:b])
-        centre = problem.centre[order]
-        b, turn = np.abs(centre), np.angle(centre) / (2 * np.pi)
+        rings = int(np.clip(2 ** np.round(0.5 * np.log2(max(problem.count // self.points, 1))), 8, MOST_RINGS))
+        inner, outer = reaches(problem.centres, problem.radii)
+        tangent, wide = tangents(problem.centres, problem.radii)
+        b, turn = np.abs(problem.centres), np.angle(problem.centres) / (2 * np.pi)
         wide /= 2 * np.pi
         widest = np.where(tangent < 0, 1, wide)
+        discs = np.stack([inner, outer, turn, widest, tangent, wide, b, problem.radii], axis=1)
+        row = one_row(problem)
+        shared = row is not None
         arrays: dict[str, np.ndarray | None] = {
             "mx": problem.source.real,
             "my": problem.source.imag,
-            "start": start,
-            "stop": stop,
-            "pairs": np.stack([inner, outer, turn, widest, tangent, wide, b, problem.radius[order]], axis=1),
-            "inner": inner,
-            "reach": reach,
-            "weight": None if problem.unit == 1 else np.round(problem.weight[order] / problem.unit).astype(np.uint32),
+            "halt": self.halt,
         }
+        if shared:
+            row = row[np.argsort(sectors(b[row], turn[row], rings), kind="stable")]
+            b, turn, inner, outer, widest = (x[row] for x in (b, turn, inner, outer, widest))
+            arrays |= {
+                "start": np.zeros(self.points, np.int64),
+                "stop": np.full(self.points, len(row), np.int64),
+                "discs": discs[row],
+            }
+            typical = float(np.median(widest)) if len(row) else 1.0
+        else:
+            disc, reach, units, typical = own_rows(problem, inner, outer, widest, self._check)
+            starts = problem.starts
+            arrays |= {"start": starts[:-1], "stop": starts[1:], "discs": discs, "disc": disc, "reach": reach}
+            arrays |= {"weight": units}
         finest = 1
-        typical = float(np.median(widest)) if len(widest) else 1.0
         levels = int(np.clip(np.ceil(np.log2(1 / (SHARPNESS * typical * ANGLES))) + 1, 1, MOST_LEVELS))
         if shared:
             arrays["raster"] = np.empty(loaded.mobius_raster_bytes(levels) // 8, np.uint64)
             finest = ANGLES << levels - 1
-            arrays |= _grid(b, turn, inner, outer, widest, rings)
+            arrays |= sector_grid(b, turn, inner, outer, widest, rings)
         elif self.points * OWN_RASTER <= MOST_OWN:
             arrays["own"] = np.empty(self.points * OWN_RASTER, np.uint8)
             finest = 256
@@ -150,14 +165,15 @@ class CompiledKernels:
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
         self.rasters = "shared" if shared else "own" if "own" in arrays else ""
+        heaviest = arrays.get("weight")
         self._problem = _Problem(
             points=self.points,
             planes=max(3, self.points.bit_length()),
             levels=levels,
             typical=typical,
-            step=max(-(-int(np.round(problem.weight.max(initial=0) / problem.unit)) // 255), 1),
+            step=max(-(-(1 if heaviest is None else int(heaviest.max(initial=0))) // 255), 1),
             coarse=COARSE / finest,
-            density=4.0 * len(problem.point) / self.points,
+            density=4.0 * problem.count / self.points,
             rings=rings,
             z_max=z_max,
             smallest=smallest,
@@ -168,6 +184,22 @@ class CompiledKernels:
             loaded.mobius_raster(ctypes.addressof(self._problem))
         elif "own" in arrays:
             loaded.mobius_own_raster(ctypes.addressof(self._problem))
+        self._check()
+
+    def reflected(self) -> CompiledKernels:
+        """Return the kernels for the conjugated source: discs and rasters are the same ones."""
+        other = copy.copy(self)
+        my = self._arrays["my"]
+        assert my is not None
+        conjugated = -my
+        other._arrays = self._arrays | {"my": conjugated}
+        other._problem = _Problem.from_buffer_copy(self._problem)
+        other._problem.my = conjugated.ctypes.data
+        return other
+
+    def _check(self) -> None:
+        """Raise Halted if there is no time to go on: what was begun is not to be used."""
+        look(self.halt)
 
     def _work(self) -> int:
         """Return the address of this thread's working memory."""
@@ -220,7 +252,10 @@ class CompiledKernels:
         return bounds * self.unit, turns * (2 * np.pi)
 
     def expand(self, nodes: Floats, value: float, budget: int) -> tuple[Floats, int]:
-        """Return what is left of cells after searching each, depth first, for `budget` bounds, and how many it took."""
+        """Return what is left of cells after searching each, depth first, for `budget` bounds, and how many it took.
+
+        If halted, the rest are left as they are.
+        """
         given = np.array(nodes, dtype=np.float64, order="C")
         given[:, BOUND] /= self.unit
         counts = np.zeros(4, np.int64)
@@ -242,49 +277,9 @@ class CompiledKernels:
             given = np.ascontiguousarray(given[done:])
             parts.append(room[: counts[0]].copy())
             spent += int(counts[1])
+            if self.halt[0]:
+                parts.append(given)
+                break
         left = np.concatenate(parts) if parts else new_nodes(0)
         left[:, BOUND] *= self.unit
         return left, spent
-
-
-def _rows(problem: Matching, rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Return an order of pairs, where in it each source point's row starts and stops, and whether it is one for all.
-
-    If every source point may match every target point, all of them share one row, sorted by the sectors of the grid;
-    otherwise each has its own, sorted by reach.
-    """
-    count = len(problem.source)
-    width = len(problem.point) // count
-    if problem.unit == 1 and width * count == len(problem.point):
-        targets = problem.target.reshape(count, width)
-        if (problem.point.reshape(count, width) == np.arange(count)[:, None]).all() and (targets == targets[0]).all():
-            centre = problem.centre[:width]
-            order = np.argsort(_sector(np.abs(centre), np.angle(centre) / (2 * np.pi), rings), kind="stable")
-            return order, np.zeros(count, np.int64), np.full(count, width, np.int64), True
-    order = np.lexsort([reaches(problem)[0], problem.point])
-    bounds = np.searchsorted(problem.point, np.arange(count + 1)).astype(np.int64)
-    return order, bounds[:-1].copy(), bounds[1:].copy(), False
-
-
-def _sector(b: Floats, turn: Floats, rings: int) -> np.ndarray:
-    """Return the number of the sector of the grid that each target point lies in, ring by ring."""
-    ring, sectors = np.minimum((b * rings).astype(np.int64), rings - 1), 2 * rings
-    return ring * sectors + np.minimum(((turn - np.floor(turn)) * sectors).astype(np.int64), sectors - 1)
-
-
-def _grid(b: Floats, turn: Floats, inner: Floats, outer: Floats, widest: Floats, rings: int) -> dict[str, np.ndarray]:
-    """Return where each sector's target points begin, and what rings of the grid a ring of images has to look at."""
-    sector = _sector(b, turn, rings)
-    ring = sector // (2 * rings)
-    wide = np.zeros(rings)
-    np.maximum.at(wide, ring, widest)
-    # of the discs that reach out to a ring or beyond the innermost, of those that reach into it or below the outermost
-    nearest, farthest = np.full(rings, rings, np.int64), np.full(rings, -1, np.int64)
-    np.minimum.at(nearest, np.clip(np.floor(outer * rings), 0, rings - 1).astype(np.int64), ring)
-    np.maximum.at(farthest, np.clip(np.floor(inner * rings), 0, rings - 1).astype(np.int64), ring)
-    return {
-        "grid": np.searchsorted(sector, np.arange(2 * rings**2 + 1)).astype(np.int64),
-        "nearest_ring": np.minimum.accumulate(nearest[::-1])[::-1],
-        "farthest_ring": np.maximum.accumulate(farthest),
-        "ring_wide": wide,
-    }

@@ -24,7 +24,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 7
+#define INTERFACE 8
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -72,8 +72,9 @@ typedef struct {
     int64_t points;         /* N1 */
     const double *mx, *my;  /* source, (N1,) */
     const int64_t *start, *stop; /* row of pairs of each source point, sorted by inner */
-    const Pair *pairs;
-    const double *inner, *reach; /* of the pairs, and the running maximum of outer along each row */
+    const Pair *discs;      /* (N2,), what the pairs with a target point have in common */
+    const uint32_t *disc;   /* of each pair; NULL: rows do not differ, and discs stand in the order of the one row */
+    const float *reach;     /* of the pairs: the running maximum of outer along each row, rounded up; NULL with `disc` */
     const uint32_t *weight; /* NULL: all 1 */
     uint64_t *raster;       /* NULL: rows differ, or weights do; then grid is NULL too, and there may be `own` */
     int64_t levels, planes; /* of the raster; of the counters */
@@ -85,6 +86,7 @@ typedef struct {
     const double *ring_wide; /* the largest `widest` in a ring of the grid */
     int64_t rings;          /* of the grid, a power of 2 below LEAST_RINGS; each has twice as many sectors */
     double z_max, smallest;
+    const volatile int32_t *halt; /* not 0: come back at once, the search is over */
 } Problem;
 
 typedef struct {
@@ -106,6 +108,8 @@ typedef struct {
     double kx, ky;
     int64_t entries, painted;
 } Outcome;
+
+static inline const Pair *disc_of(const Problem *p, int64_t pair) { return p->discs + (p->disc ? p->disc[pair] : pair); }
 
 static inline double least(double a, double b) { return a < b ? a : b; }
 static inline double most(double a, double b) { return a > b ? a : b; }
@@ -355,13 +359,14 @@ EXPORT int64_t mobius_raster_bytes(int64_t levels) {
     return (int64_t)(words * sizeof(uint64_t));
 }
 
-/* Draw the discs of the one row of pairs. */
+/* Draw the discs of the one row of pairs; only some of them if halted. */
 EXPORT void mobius_raster(const Problem *p) {
     for (int level = 0; level < p->levels; level++) {
         uint64_t *raster = (uint64_t *)level_of(p->raster, level);
         int angles = angles_of(level), rings = rings_of(level), words = angles / 64, length = row_words(level);
         uint64_t plain[(ANGLES << (MOST_LEVELS - 1)) / 64 + 1];
         for (int ring = 0; ring < rings; ring++) {
+            if (*p->halt) return;
             double near = ring * (1.0 / rings), far = (ring + 1) * (1.0 / rings);
             uint64_t *row = raster + row_of(level, 0, FIRST_SPREAD, ring);
             for (int i = 0; i < words; i++) plain[i] = 0;
@@ -369,7 +374,7 @@ EXPORT void mobius_raster(const Problem *p) {
             int64_t first = p->grid[p->nearest_ring[ring * p->rings / rings] * 2 * p->rings];
             int64_t last = p->grid[(p->farthest_ring[ring * p->rings / rings] + 1) * 2 * p->rings];
             for (int64_t k = first; k < last; k++) {
-                const Pair *pair = p->pairs + k;
+                const Pair *pair = p->discs + k;
                 if (pair->outer < near || pair->inner > far) continue;
                 double half_width = pair_half_width(pair, near, far, 0x1p-14) + SLACK;
                 if (2 * half_width + 2.0 / angles >= 1) { paint(plain, 0, angles - 1); continue; }
@@ -549,7 +554,7 @@ static inline int lay_pairs(Laying *l, uint32_t j, const Entry *list, int64_t lo
     int touched = 0;
     for (int64_t k = low; k < high; k++) {
         int64_t number = list ? list[k].pair : k;
-        const Pair *pair = p->pairs + number;
+        const Pair *pair = disc_of(p, number);
         if (pair->outer < near || pair->inner > far) continue;
         if (l->width < 1) { /* too far from the window, however wide the disc looks */
             double apart = pair->turn - alpha - l->middle;
@@ -576,7 +581,7 @@ static inline int lay_row(Laying *l, uint32_t j, double near, double far, double
         int64_t low = p->start[j], high = p->stop[j], a = low, b = high;
         while (a < b) { int64_t mid = (a + b) / 2; if (p->reach[mid] < near) a = mid + 1; else b = mid; }
         low = a; b = high;
-        while (a < b) { int64_t mid = (a + b) / 2; if (p->inner[mid] <= far) a = mid + 1; else b = mid; }
+        while (a < b) { int64_t mid = (a + b) / 2; if (disc_of(p, mid)->inner <= far) a = mid + 1; else b = mid; }
         return lay_pairs(l, j, 0, low, a, near, far, alpha, delta, bits);
     }
     int rings = (int)p->rings, all = 2 * rings, inside = (int)(near * rings), outside = (int)(far * rings), touched = 0;
@@ -683,13 +688,13 @@ static void weigh_heavy(const uint32_t *total, const uint64_t *window, const Que
     }
 }
 
-/* Draw each source point's own discs. */
+/* Draw each source point's own discs; only of some if halted. */
 EXPORT void mobius_own_raster(const Problem *p) {
-    for (int64_t j = 0; j < p->points; j++) {
+    for (int64_t j = 0; j < p->points && !*p->halt; j++) {
         uint8_t *raster = p->own + j * OWN_RINGS * HEAVY_BINS;
         for (int i = 0; i < OWN_RINGS * HEAVY_BINS; i++) raster[i] = 0;
         for (int64_t k = p->start[j]; k < p->stop[j]; k++) {
-            const Pair *pair = p->pairs + k;
+            const Pair *pair = disc_of(p, k);
             int64_t weight = p->weight ? p->weight[k] : 1;
             uint8_t level = (uint8_t)((weight + p->step - 1) / p->step);
             int first = (int)(most(pair->inner, 0) * OWN_RINGS), last = (int)(least(pair->outer, 1) * OWN_RINGS);
@@ -774,6 +779,7 @@ static void sum_pairs(const Problem *p, Work *w, const Query *q, int64_t n, doub
     else counter_clear(&w->counter, WORDS, (int)p->planes);
     int64_t cursor = 0;
     for (int64_t i = 0; i < n; i++) {
+        if (*p->halt) break; /* whoever asked throws the outcome away */
         double near = w->near[i], far = w->far[i], alpha = w->alpha[i], delta = w->delta[i];
         uint64_t bits[WORDS] = {0};
         uint32_t j = q->parents ? w->active[i] : (uint32_t)i;
@@ -911,13 +917,13 @@ EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, int32_t rast
 typedef struct { Node node; int64_t offset, entries, free; } Open; /* list of pairs (entries < 0: none), arena in use */
 
 /* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretches
-   of its window. Worth 0: not above `value`, or not above the z before it. */
+   of its window. Worth 0: not above `value`, or not above the z before it, or not looked at before a halt. */
 EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, const double *from,
                              const double *width, double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
+    for (int64_t i = 0; i < n; i++) turns[i] = bounds[i] = 0;
     for (int64_t i = 0; i < n; i++) {
         double overstated = 0x1p40; /* the bound over the whole window */
-        turns[i] = bounds[i] = 0;
         /* Coarse stretches overstate: the best of them need not hold the best rotation, so all that are nearly as good are
            kept until they no longer shrink; and those that are less good too if none turns out to hold what it seemed to. */
         for (double share = 0.85; share > 0.4 && overstated > value; share -= 0.3) {
@@ -935,6 +941,7 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
                 int strict = !raster && (seen.free || node.width < 0x1p-6), base = depth;
                 Query query = {&node, value, raster, list, seen.entries, children, w.room - top, ALIKE, strict ? 1 : share};
                 evaluate(p, &w, &query, &out);
+                if (*p->halt) return;
                 if (looks == 0) overstated = out.bound;
                 if (children && out.entries > 0) { seen.offset = top; seen.entries = out.entries; top += out.entries; }
                 for (int c = 0; c < out.clusters; c++) {
@@ -963,7 +970,7 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
 }
 
 /* Search the subtrees of `nodes` depth first for cells whose bound exceeds `value`, at most `budget` bounds each; what is
-   left open goes to `left`. Returns how many of `nodes` were taken on (all, unless `left` might overflow).
+   left open goes to `left`. Returns how many of `nodes` were taken on (all, unless `left` might overflow, or halted).
    counts: nodes left, bounds computed, arcs laid, bounds that inherited a list of pairs. */
 EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, double value, int64_t budget, Node *left,
                              int64_t left_room, int64_t *counts, void *memory, int64_t arena) {
@@ -971,7 +978,7 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
     Work w = work_in(memory, p->points, arena);
     Open stack[STACK];
     int64_t bounds = 0, painted = 0, inherited = 0, done = 0, found = 0;
-    for (; done < n && found + STACK <= left_room; done++) {
+    for (; done < n && found + STACK <= left_room && !*p->halt; done++) {
         int64_t depth = 1, spent = 0;
         stack[0] = (Open){nodes[done], 0, -1, 0};
         while (depth) {
@@ -985,8 +992,9 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
             }
             int64_t top = open.free;
             int64_t base = depth;
+            int halted = *p->halt;
             double half = open.node.half / 2;
-            for (int q = 0; q < 4; q++) {
+            for (int q = 0; q < 4 && !halted; q++) {
                 Node child = open.node;
                 double sx = side[q][0] * half, sy = side[q][1] * half;
                 child.half = half; child.x += sx; child.y += sy;
@@ -999,6 +1007,7 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                 if (raster) {
                     Query query = {&child, value, 1, 0, 0, 0, 0, p->raster ? RASTER_GAP : gap, 0};
                     evaluate(p, &w, &query, &coarse);
+                    if ((halted = *p->halt)) break;
                     bounds++; spent++;
                     child.kx = coarse.kx; child.ky = coarse.ky;
                 } else {
@@ -1016,6 +1025,7 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                     Entry *children = child.width < 1 ? w.arena + top : 0;
                     Query query = {&child, value, 0, list, open.entries, children, w.room - top, gap, 0};
                     evaluate(p, &w, &query, &out);
+                    if ((halted = *p->halt)) break;
                     bounds++; spent++; painted += out.painted; inherited += list != 0;
                     int64_t kept = children ? out.entries : -1;
                     for (int k = 0; k < out.clusters; k++) {
@@ -1029,6 +1039,11 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
                     }
                     if (out.clusters && kept > 0) top += kept;
                 }
+            }
+            if (halted) { /* what was begun counts as not begun; the rest of the stack follows */
+                depth = base;
+                left[found++] = open.node;
+                continue;
             }
             /* the most promising last, that is next; the lists stay in the arena until all of these are done */
             for (int64_t i = base + 1; i < depth; i++) {

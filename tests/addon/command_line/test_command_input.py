@@ -26,6 +26,8 @@ from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
         (2, ["align", "source.blend:Nobody", "target.obj"], "has no mesh object named 'Nobody': it has 'Source'"),
         (2, ["align", "source.obj", "target.obj", "--report", "no/r.json"], "there is no folder 'no'"),
         (2, ["align", "source.obj", "target.obj", "--samples", "1"], "must be at least 3"),
+        (2, ["align", "source.obj", "target.obj", "--time-limit=-1"], "time_limit must be a number of seconds, not -1"),
+        (2, ["align", "source.obj", "target.obj", "--time-limit=nan"], "time_limit must be a number of seconds"),
         (2, ["align", "source.obj", "target.obj", "--map", "x", "--report", "x"], "two outputs have the same name"),
         (2, ["flatten", "target.obj", "-o", "out.xyz"], "'out.xyz' has an ending that is not known"),
         (2, ["flatten", "target.obj", "-o", "folder"], "'folder' has an ending that is not known"),

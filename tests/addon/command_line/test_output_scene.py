@@ -130,33 +130,30 @@ def test_a_driver_that_points_into_the_sources_file_is_said_and_left(
     assert data is None or not data.drivers
 
 
-def test_a_linked_mesh_is_copied_and_a_linked_object_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("way", ["LINKED", "OVERRIDE"])
+def test_what_is_linked_is_read_and_neither_changed_nor_replaced(
+    way: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = build(Scene(others=("OVERRIDE",)), tmp_path / "scene")
-    out = tmp_path / "out.blend"
-    library = (tmp_path / "scene" / "library.blend").read_bytes()
+    path = build(Scene(others=(way,)), tmp_path / "scene")
+    out, library = tmp_path / "out.blend", tmp_path / "scene" / "library.blend"
     status, _, err = run(capsys, "flatten", f"{path}:Linked", "-o", out)
-    assert status == 0
-    assert "the mesh of 'Linked' belongs to another file: 'Linked' gets a copy of its own" in err
-    opened(out)
-    own = next(x for x in bpy.data.objects if x.name == "Linked" and x.library is None)
-    assert own.override_library is not None
-    assert "Mobius Disc" in own.data.uv_layers
-    assert (tmp_path / "scene" / "library.blend").read_bytes() == library
-
-    path = build(Scene(others=("LINKED",)), tmp_path / "other")
-    status, _, err = run(capsys, "flatten", f"{path}:Linked", "-o", tmp_path / "no.blend")
-    assert status == 2
-    assert "'Linked' is linked from" in err
-    library = tmp_path / "other" / "library.blend"
+    assert status == 1
+    assert f"'Linked' in '{path}' is linked from 'library.blend' and cannot be changed" in err
+    assert not out.exists()
     status, _, err = run(capsys, "flatten", f"{path}:Target", "-o", library)
     assert (status, "is linked by the file that would be written there" in err) == (1, True)
-    # it is read all the same
     status, _, err = run(capsys, "transfer", f"{path}:Linked", f"{path}:Target", "-o", out, *CARRY)
     assert (status, err) == (0, "")
     assert weights(opened(out), "From Library").max() == pytest.approx(0.5)
-    assert bpy.data.objects["Linked"].library is not None
+    mesh = bpy.data.objects["Linked"].data
+    assert mesh.library is not None
+    # so it is from another file, which leaves nothing behind
+    other = build(Scene(), tmp_path / "other")
+    status, _, err = run(capsys, "transfer", f"{path}:Linked", f"{other}:Target", "-o", out, *CARRY)
+    assert (status, err) == (0, "")
+    assert weights(opened(out), "From Library").max() == pytest.approx(0.5)
+    assert not bpy.data.libraries
+    assert not any(x.name.startswith("Linked") for x in bpy.data.objects)
 
 
 def test_each_of_several_targets_of_one_file_has_its_scene(

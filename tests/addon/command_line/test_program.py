@@ -40,3 +40,51 @@ def test_without_blenders_module_there_is_a_sentence(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.startswith("mobius: the Python package 'bpy' is missing or not for this Python")
     assert "Traceback" not in done.stderr
+
+
+GUARDED = """
+import importlib, importlib.util, os, signal, sys
+from pathlib import Path
+spec = importlib.util.spec_from_file_location("mobius_command", ROOT + "/__main__.py")
+command = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(command)
+command.load_extension()
+streams = importlib.import_module(command.PACKAGE + ".mobius_addon.streams")
+guarded = importlib.import_module(command.PACKAGE + ".mobius_addon.command_line").guarded
+def run():
+    RUN
+sys.exit(guarded(run))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a run has no process of its own")
+@pytest.mark.parametrize(
+    ("code", "status", "said"),
+    [
+        ("return 0", 0, ""),
+        ("return 1", 1, ""),
+        ("with streams.reading(Path('a.usdc')): os.kill(os.getpid(), signal.SIGSEGV)", 2,
+         "mobius: 'a.usdc' could not be read: it ends Blender (Segmentation fault), so it is damaged or too large\n"),
+        ("with streams.reading(Path('x')): pass\n    os.kill(os.getpid(), signal.SIGABRT)", 134,
+         "mobius: ended: Aborted\n"),
+    ],
+)  # fmt: skip
+def test_a_crash_while_a_file_is_read_is_a_sentence(code: str, status: int, said: str) -> None:
+    program_text = GUARDED.replace("ROOT", repr(str(ROOT))).replace("RUN", code)
+    done = subprocess.run(
+        [sys.executable, "-c", program_text], capture_output=True, text=True, timeout=60, check=False
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (status, said)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a run has no process of its own")
+def test_a_run_ends_with_the_program(tmp_path: Path) -> None:
+    code = "print(os.getpid(), flush=True); signal.pause()"
+    program_text = GUARDED.replace("ROOT", repr(str(ROOT))).replace("RUN", code)
+    with subprocess.Popen([sys.executable, "-c", program_text], stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None
+        child = int(running.stdout.readline())
+        assert child != running.pid
+        running.kill()
+        # at the end of the last writer, not before
+        assert running.stdout.read() == ""

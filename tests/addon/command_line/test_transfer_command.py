@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import QUICK, run
-from scenes import make_sheet, positions, weights
+from scenes import corner_values, make_sheet, positions, weights
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
@@ -104,13 +104,75 @@ def test_two_objects_of_one_blend(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert np.allclose(weights(bpy.data.objects["Scan.001"], "Head"), 0.5)
 
 
+def reordered(obj_file: Path, path: Path) -> Path:
+    """Write the surface of an .obj with its vertices in another order."""
+    lines = [line.split() for line in obj_file.read_text().splitlines() if line.startswith(("v ", "f "))]
+    vertices = [" ".join(words) for words in lines if words[0] == "v"]
+    order = np.random.default_rng(0).permutation(len(vertices))
+    new = np.argsort(order) + 1
+    faces = [[new[int(word.split("/")[0]) - 1] for word in words[1:]] for words in lines if words[0] == "f"]
+    texts = [vertices[k] for k in order] + [f"f {' '.join(map(str, face))}" for face in faces]
+    path.write_text("\n".join(texts) + "\n")
+    return path
+
+
 def test_a_map_of_other_meshes_is_refused(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, target, map_file = scans / "source.obj", scans / "target.obj", scans / "m.npz"
     assert run(capsys, "align", source, target, "--map", map_file, *QUICK)[0] == 0
     common = ["-o", scans / "o.blend", "--use-map", map_file]
     status, _, err = run(capsys, "transfer", target, source, *common)
-    assert (status, err) == (2, f"mobius: '{map_file}' was made for another source than '{target}'\n")
+    assert (status, err) == (2, f"mobius: '{map_file}' was made for a source of 800 faces, but '{target}' has 450\n")
     status, _, err = run(capsys, "transfer", source, scans / "hole.obj", *common)
     assert status == 2
     assert f"was made for a target of 256 vertices, but '{scans / 'hole.obj'}' has 36" in err
+    for role, obj_file in (("source", source), ("target", target)):
+        other = reordered(obj_file, scans / "reordered.obj")
+        pair = [other if x == role else y for x, y in (("source", source), ("target", target))]
+        status, _, err = run(capsys, "transfer", *pair, *common)
+        assert status == 2
+        assert f"'{map_file}' was made for another {role} than '{other}', or for this one before its vertices" in err
     assert not (scans / "o.blend").exists()
+
+
+def test_a_damaged_map_is_a_sentence(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, target, map_file = scans / "source.obj", scans / "target.obj", scans / "m.npz"
+    assert run(capsys, "align", source, target, "--map", map_file, *QUICK)[0] == 0
+    map_file.write_bytes(map_file.read_bytes()[:-100])
+    status, _, err = run(capsys, "transfer", source, target, "-o", scans / "o.blend", "--use-map", map_file)
+    assert status == 2
+    assert f"mobius: '{map_file}' is not a map that this program wrote, or it is damaged" in err
+
+
+def textured_target(path: Path) -> np.ndarray:
+    """Save a target whose material uses a UV map of its own under the source's name, and return that map."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = make_sheet("Cloth", 16)
+    uv = np.random.default_rng(0).random((len(obj.data.loops), 2)).astype(np.float32)
+    obj.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.ravel())
+    obj.data.materials.append(bpy.data.materials.new("Own"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return uv
+
+
+def test_the_target_keeps_its_own_uv_map_and_a_second_run_adds_nothing(
+    scans: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = textured_target(scans / "cloth.blend")
+    said = "mobius: warning: 'Cloth' keeps its own UV map 'UVMap': carried as 'UVMap.001'\n"
+    given = scans / "cloth.blend"
+    for out in (scans / "first.blend", scans / "second.blend"):
+        status, _, err = run(capsys, "transfer", scans / "source.blend", given, "-o", out, "--only", "uv", *QUICK)
+        assert (status, err) == (0, said)
+        bpy.ops.wm.open_mainfile(filepath=str(out))
+        layers = bpy.data.objects["Cloth"].data.uv_layers
+        assert layers.keys() == ["UVMap", "UVMap.001"]
+        assert (corner_values(bpy.data.objects["Cloth"], "UVMap") == own).all()
+        assert (layers.active.name, [x.name for x in layers if x.active_render]) == ("UVMap", ["UVMap"])
+        given = out
+    out = scans / "third.blend"
+    status, _, err = run(
+        capsys, "transfer", scans / "source.blend", given, "-o", out, "--only", "uv", "--collisions", "replace", *QUICK
+    )
+    assert (status, err) == (0, "")
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    assert np.abs(corner_values(bpy.data.objects["Cloth"], "UVMap") - own).max() > 0.1

@@ -143,6 +143,15 @@ def test_an_odd_sheet_is_not_ambiguous(found):
     assert alignment.rival_margin > 2 * alignment.settings.reflect_margin
 
 
+def test_a_margin_that_time_decided_is_not_told(found):
+    alignment, _ = found
+    late = replace(alignment, rival=replace(alignment.rival, out_of_time=True))
+    assert late.rival_margin is None
+    assert report(late, correspond(late))["rival_margin"] is None
+    assert replace(alignment, search=replace(alignment.search, out_of_time=True)).rival_margin is None
+    assert alignment.rival_margin == (alignment.search.value - alignment.rival.upper_bound) / 40
+
+
 def test_landmarks_decide_what_the_surface_leaves_open():
     """On a sheet with a two-fold symmetry ten landmarks, two of them wrong, choose the half turn or none."""
     even = bumps(900, seed=1, folds=2)

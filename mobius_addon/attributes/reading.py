@@ -1,0 +1,299 @@
+"""A transfer that is prepared: everything read first, then carried, and given its names on the target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...solver import Cancelled, Progress
+from ...solver.surface.mesh import Floats
+from ..mesh_data import Refusal
+from .access import MAX_UV_MAPS, Layer
+from .carrier import Carrier, Values
+from .chosen import chosen_layers
+from .key_animation import left_behind
+from .key_set import KeyPlan, KeySet, key_set, planned
+from .looks import Looks, looks_of
+from .missing import carried_without_missing, missing_warning
+from .mixing import changes, mixed, over
+from .placing import Place, holds_nothing, is_same, joins, kept_notes, replaced_notes
+from .plan import Carried, Transfer
+from .record import Written, unedited
+from .settings import TransferSettings
+from .shape_keys import ShapeKeyAccess, limited
+from .table import KINDS, ROWS, Row
+from .unmatched import Unmatched
+from .vertex_groups import read_weights
+from .weights import tidied
+
+_LABELS = {kind.identifier: kind.label for kind in KINDS}
+
+
+@dataclass(frozen=True, eq=False)
+class _Pending:
+    """A layer that was read, who carries it, and where it can go."""
+
+    row: Row
+    carrier: Carrier
+    layer: Layer
+    place: Place
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Everything that a transfer needs of the two objects, as arrays: `carry` may run in a thread of its own."""
+
+    pending: tuple[_Pending, ...]
+    carrier: Carrier
+    settings: TransferSettings
+    influence: Floats | None
+    locked: Floats | None
+    looks: Looks
+    keys: tuple[KeySet | None, KeySet | None]
+    maps: frozenset[str]
+    warnings: tuple[str, ...]
+    names: tuple[str, str]
+    unmatched: Unmatched
+
+    def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
+        """Carry every layer.
+
+        Raises
+        ------
+        Cancelled
+            The progress callback returned False.
+        Refusal
+            Nothing is left to write, or there are more UV maps than Blender allows.
+        """
+        warnings = list(self.warnings)
+        layers: list[tuple[_Pending, Carried]] = []
+        for number, pending in enumerate(self.pending):
+            row, name = pending.row, pending.layer.name
+            step = Progress(f"{_LABELS[row.kind]} of '{self.names[1]}'", number / len(self.pending))
+            if progress is not None and progress(step) is False:
+                raise Cancelled
+            carried, missing = self._carried(pending)
+            if row.marks:
+                # flags that most meshes have: no word about those that stay as they are
+                if not changes(carried, pending.place.there):
+                    continue
+                if carried.name != name:
+                    warnings.append(f"'{self.names[1]}' has an attribute of another type named '{name}': delete it")
+                    continue
+            if missing:
+                warnings.append(missing_warning(row, name, self.names[0], missing))
+            layers.append((pending, carried))
+        if not layers:
+            raise Refusal(_nothing(self.names[0], self.settings, warnings))
+        placed, notes = self._placed(self._tidied(layers))
+        settled, keys, more = self._settled(placed)
+        maps = self.maps | {x.name for x in settled if x.row.kind == "uv"}
+        if len(maps) > MAX_UV_MAPS:
+            raise Refusal(
+                f"'{self.names[1]}' would have {len(maps)} UV maps and Blender allows {MAX_UV_MAPS}: delete some first"
+            )
+        shown_uv, shown_color, others = self.looks.shown(settled, self.names)
+        warnings += [*notes, *more, *others, *self.unmatched.warnings(self.names[1])]
+        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched)
+
+    def _carried(self, pending: _Pending) -> tuple[Carried, int]:
+        """Return a carried layer, and how many elements of the source have no number for it."""
+        row, settings, layer, place = pending.row, self.settings, pending.layer, pending.place
+        values, covered, missing = carried_without_missing(row, pending.carrier, layer.values)
+        share = np.ones(len(values))
+        if self.influence is not None:
+            share = self.carrier.at(row.access.domain, self.influence)
+        if row.mixes:
+            covered = covered & (share > 0)
+            values = mixed(values, place.there, settings.mix, settings.mix_factor * share)
+        else:
+            covered = covered & (share >= 0.5)
+        return Carried(row, layer.name, place.name, values, covered, layer.about), missing
+
+    def _tidied(self, layers: list[tuple[_Pending, Carried]]) -> list[tuple[_Pending, Carried]]:
+        groups = [x for _, x in layers if x.row.kind == "vertex-groups"]
+        if not groups:
+            return layers
+        columns = tidied(
+            np.clip(np.stack([np.where(x.covered, x.values, 0) for x in groups], axis=1), 0, 1),
+            np.any([x.covered for x in groups], axis=0),
+            smallest=self.settings.smallest_weight,
+            limit=self.settings.limit,
+            normalize=self.settings.normalize,
+            locked=self.locked,
+        )
+        done = iter([replace(x, values=column) for x, column in zip(groups, columns.T, strict=True)])
+        return [(pending, next(done) if x.row.kind == "vertex-groups" else x) for pending, x in layers]
+
+    def _placed(self, layers: list[tuple[_Pending, Carried]]) -> tuple[list[Carried], list[str]]:
+        """Return the layers under the names that they get, and sentences about what is kept or replaced."""
+        result, kept, lost = [], [], []
+        for pending, carried in layers:
+            row, place = pending.row, pending.place
+            there = place.there
+            same = is_same(row, carried.values, carried.covered, there, carried.about)
+            free = same or holds_nothing(row, there)
+            asked = self.settings.collisions == "replace" or joins(row, self.settings)
+            name = place.chosen(asked or free)
+            if row.once and not (asked or free or place.earlier):
+                lost.append(row.kind)
+            if name != place.name:
+                kept.append((row.kind, place.name, name))
+                assert there is not None
+                carried = over(carried, there)
+            own = same and not place.earlier and not holds_nothing(row, there)
+            result.append(replace(carried, name=name, own=own))
+        return result, [*kept_notes(self.names[1], kept), *replaced_notes(self.names[1], lost)]
+
+    def _settled(self, layers: list[Carried]) -> tuple[list[Carried], KeyPlan | None, list[str]]:
+        """Return the layers with shape keys that know their companions' names, and what becomes of all keys."""
+        source = self.keys[0]
+        if source is None or not any(x.row.kind == "shape-keys" for x in layers):
+            return layers, None, []
+        keys, groups = (
+            {x.source_name: x.name for x in layers if x.row.kind == kind} for kind in ("shape-keys", "vertex-groups")
+        )
+        sliders = [(x.source_name, x.name, x.about.renamed(keys, groups)) for x in layers if x.row.kind == "shape-keys"]
+        plan, notes = planned(source, self.keys[1], sliders, self.names[1])
+        return (
+            [replace(x, about=plan.sliders[x.name]) if x.row.kind == "shape-keys" else x for x in layers],
+            plan,
+            notes,
+        )
+
+
+def read_transfer(
+    source: bpy.types.Object,
+    target: bpy.types.Object,
+    carrier: Carrier,
+    settings: TransferSettings,
+    *,
+    shown_source: bpy.types.Object | None = None,
+    keys_carrier: Carrier | None = None,
+    influence: Floats | None = None,
+    unmatched: Unmatched | None = None,
+) -> Reading:
+    """Read everything of the chosen kinds from the source, and what matters to it of the target.
+
+    Parameters
+    ----------
+    source, target : bpy.types.Object
+        Mesh objects in Object Mode.
+    carrier : Carrier
+        The correspondence between them.
+    settings : TransferSettings
+    shown_source : bpy.types.Object, optional
+        The evaluated source, to read layers from; shape keys are the source's own.
+    keys_carrier : Carrier, optional
+        The correspondence with the source's own mesh, for shape keys, if `carrier` is one with an evaluated mesh.
+    influence : (n_target,) float, optional
+        The target's mask, in [0, 1]; None: 1.
+    unmatched : Unmatched, optional
+        What is unmatched and what `carrier` does about it; by default what it says itself.
+
+    Raises
+    ------
+    Refusal
+        Nothing to carry.
+    """
+    read, warnings, locked = [], [], []
+    for row in ROWS:
+        if row.kind in settings.kinds:
+            keys = row.kind == "shape-keys"
+            whence, way = (source, keys_carrier or carrier) if keys else (shown_source or source, carrier)
+            layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
+            if keys and not _groups_come_along(settings, shown_source):
+                layers = [limited(layer) for layer in layers]
+            read.append((row, way, layers))
+    pending: list[_Pending] = []
+    reserved = {layer.name for _, _, layers in read for layer in layers}
+    earlier = unedited(target, settings.kinds)
+    for row, way, layers in read:
+        found = []
+        for layer in layers:
+            name = row.access.place(target, layer.name, {x.place.name for x in pending} | {x[1] for x in found})
+            if name is None:
+                warnings.append(f"'{layer.name}' is locked on '{target.name}' and left as it is")
+                locked += [layer.name] if row.kind == "vertex-groups" else []
+                continue
+            if name != layer.name and not row.marks:
+                warnings.append(f"'{target.name}' has something else named '{layer.name}': it becomes '{name}'")
+            found.append((layer, name))
+        names = [name for _, name in found]
+        there = row.access.existing(target, names)
+        if isinstance(row.access, ShapeKeyAccess) and joins(row, settings):
+            there = row.access.shown(target, names)
+        for layer, name in found:
+            place = _place(row, target, layer.name, name, there.get(name), earlier, reserved)
+            reserved |= {x for x in (place.before, place.beside) if x is not None}
+            pending.append(_Pending(row, way, layer, place))
+    if not pending:
+        raise Refusal(_nothing(source.name, settings, warnings))
+    if target.data.users > 1:
+        warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
+    warnings += left_behind(source, target, [x.layer.name for x in pending if x.row.kind == "shape-keys"])
+    fixed = None
+    if locked and settings.normalize:
+        fixed = read_weights(target, locked).sum(axis=1)
+    return Reading(
+        tuple(pending),
+        carrier,
+        settings,
+        influence,
+        fixed,
+        looks_of(source, target),
+        (key_set(source), key_set(target)),
+        frozenset(layer.name for layer in target.data.uv_layers),
+        tuple(warnings),
+        (source.name, target.name),
+        unmatched or Unmatched.of(carrier),
+    )
+
+
+def plan_transfer(
+    source: bpy.types.Object, target: bpy.types.Object, carrier: Carrier, settings: TransferSettings | None = None
+) -> Transfer:
+    """Carry everything of the chosen kinds from source to target, without writing yet; see `read_transfer`."""
+    return read_transfer(source, target, carrier, settings or TransferSettings()).carry()
+
+
+def _groups_come_along(settings: TransferSettings, shown_source: bpy.types.Object | None) -> bool:
+    """Return whether carried vertex groups are what limits shape keys on the source, or are changed on their way."""
+    return (
+        "vertex-groups" in settings.kinds
+        and shown_source is None
+        and settings.limit == 0
+        and not settings.normalize
+        and settings.target_mask.by == "none"
+        and settings.mix == "replace"
+        and settings.mix_factor == 1
+    )
+
+
+def _place(
+    row: Row,
+    target: bpy.types.Object,
+    source_name: str,
+    name: str,
+    there: Values | None,
+    earlier: Iterable[Written],
+    reserved: set[str],
+) -> Place:
+    """Return where a layer can go: under a name that it is to have, and beside what has it."""
+    ours = [x for x in earlier if x.kind == row.kind]
+    is_ours = any(x.name == name for x in ours)
+    if there is None or row.once or is_ours:
+        return Place(name, there, is_ours)
+    before = [x.name for x in ours if x.source_name == source_name and x.name not in reserved]
+    beside = row.access.place(target, source_name, reserved, number=True)
+    return Place(name, there, False, next(iter(before), None), beside)
+
+
+def _nothing(source: str, settings: TransferSettings, warnings: Iterable[str]) -> str:
+    wanted = " or ".join(kind.noun for kind in KINDS if kind.identifier in settings.kinds)
+    which = {"all": "", "active": "active ", "named": "so named "}[settings.layers]
+    why = "; ".join(warnings)
+    return f"'{source}' has no {which}{wanted} to transfer" + (f" ({why})" if why else "")

@@ -1,0 +1,86 @@
+"""What a search says of itself at its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from ..mobius import Mobius
+from ..surface.mesh import Integers
+from .matching import Matching
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The outcome of a search, complete or not.
+
+    Attributes
+    ----------
+    mobius : Mobius
+        The best transformation found.
+    value : float
+        Its Q in exact arithmetic, by `matches`. Less only where time ran out before it was counted even once, and where
+        more than 4,096 pairs at a time lie so near the rim of their discs that floats do not decide.
+    upper_bound : float
+        No transformation with |z| <= z_max has a larger Q.
+    certified : bool
+        value == upper_bound: the transformation is globally optimal, exactly.
+    nodes : int
+        Cells whose bound was computed.
+    seconds : float
+        Wall-clock time.
+    matches : (p, 2) int
+        A (source point, target point) pair for each matched source point.
+    cancelled : bool
+        Whether the progress callback ended the search.
+    out_of_time : bool
+        Whether the time limit ended it: another run may then end elsewhere.
+    kernels : str
+        What computed the bounds: "compiled" or "numpy".
+    """
+
+    mobius: Mobius
+    value: float
+    upper_bound: float
+    certified: bool
+    nodes: int
+    seconds: float
+    matches: Integers
+    cancelled: bool = False
+    out_of_time: bool = False
+    kernels: str = ""
+    counted: tuple[Matching, Mobius] | None = field(default=None, repr=False)
+    """The problem, and the transformation as it takes it."""
+
+    @property
+    def gap(self) -> float:
+        """How much better a transformation could still be: upper_bound - value."""
+        return self.upper_bound - self.value
+
+    @property
+    def relative_gap(self) -> float:
+        """The gap as a share of the value, as `search` takes it."""
+        return self.gap / self.value if self.value > 0 else (np.inf if self.gap > 0 else 0.0)
+
+    @cached_property
+    def one_to_one(self) -> float:
+        """The greatest weight of pairs within reach under `mobius` that share neither source nor target point.
+
+        Computed when it is asked for: for thousands of points that takes seconds, and 8 bytes per pair of matched ones.
+        """
+        return 0.0 if self.counted is None else one_to_one(*self.counted)
+
+
+def one_to_one(problem: Matching, mobius: Mobius) -> float:
+    """Return the greatest weight of pairs within reach that share neither source nor target point."""
+    hits, j, k = problem.within(mobius)
+    if len(hits) == 0:
+        return 0.0
+    rows, row = np.unique(j, return_inverse=True)
+    columns, column = np.unique(k, return_inverse=True)
+    table = np.zeros((len(rows), len(columns)))
+    table[row, column] = problem.weights_of(hits)
+    return float(table[linear_sum_assignment(table, maximize=True)].sum())

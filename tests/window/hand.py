@@ -1,0 +1,97 @@
+"""Hand and eye of a person at Blender's window: keys, clicks, and what the mouse is over.
+
+`region`, `click` and `shot` are the driver's, which `clicks.py` hands on.
+"""
+
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+SHOTS = Path(os.environ["MOBIUS_SHOTS"])
+STEP = 12
+"""Pixels between places where a button is looked for; a row is twenty high."""
+
+Wait = Iterator[float]
+
+region: Callable[[str], Any]
+click: Callable[[int, int], None]
+shot: Callable[[str], None]
+
+
+def until(happened: Any, every: float = 0.1) -> Wait:
+    """Wait for something, two minutes at most."""
+    end = time.monotonic() + 120
+    while not happened():
+        assert time.monotonic() < end, "nothing happened in two minutes"
+        yield every
+
+
+def picture(name: str, wait: float = 1.2) -> Wait:
+    yield wait
+    shot(str(SHOTS / f"{name}.png"))
+
+
+def pointer(*arguments: object) -> None:
+    subprocess.run(["xdotool", *map(str, arguments)], check=True)
+
+
+def escape() -> None:
+    pointer("key", "Escape")
+
+
+def undo() -> None:
+    over_the_viewport()
+    pointer("key", "ctrl+z")
+
+
+def redo() -> None:
+    over_the_viewport()
+    pointer("key", "ctrl+shift+z")
+
+
+def over_the_viewport() -> None:
+    part = region("WINDOW")
+    pointer("mousemove", part.x + part.width // 3, screen_height() - part.y - 40)
+
+
+def screen_height() -> int:
+    return bpy.context.window.height
+
+
+def click_on(place: tuple[int, int]) -> Wait:
+    click(*place)
+    yield 0.3
+    over_the_viewport()
+
+
+def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False) -> Any:
+    """Return where the sidebar's button of a command is: move the mouse along and ask at each place."""
+    sidebar = region("UI")
+    x = sidebar.x + (sidebar.width - 24) // 2
+    top = screen_height() - (sidebar.y + sidebar.height)
+    places = range(top + 30, top + sidebar.height - 5, STEP)
+    for y in reversed(places) if upwards else places:
+        bpy.context.window_manager.clipboard = ""
+        pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", keys)
+        yield 0.1
+        if bpy.context.window_manager.clipboard.startswith(command):
+            print(f"[clicks] {command} is at {x}, {y}", flush=True)
+            return x, y
+    raise AssertionError(f"the sidebar shows nothing of {command}")
+
+
+def choose(role: str, obj: Any) -> Wait:
+    """Choose an object in a picker: click on it, type the name, confirm."""
+    place = yield from find(f'bpy.data.scenes["Scene"].mobius.{role}', "ctrl+alt+shift+c")
+    click(*place)
+    yield 0.8
+    pointer("type", "--delay", "40", obj.name)
+    yield 0.8
+    pointer("key", "Return")
+    yield 0.8
+    over_the_viewport()
