@@ -14,6 +14,7 @@ from ..flatten.flatten import Flattening, flatten
 from ..stages import Progress, Stages
 from ..surface.cleaning import Cleaned, in_order
 from ..surface.descriptors import diffused_curvatures
+from ..surface.fairing import faired
 from ..surface.mesh import Floats, Integers, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
@@ -64,13 +65,13 @@ class Surface:
 
     @cached_property
     def flattening(self) -> Flattening:
-        """Of the mesh in order; raises `MeshError`."""
-        return flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=self.outer_vertex)
+        """Of the mesh in order, made fair where it is rough; raises `MeshError`."""
+        return flatten(faired(self.cleaned.mesh), fill_holes=self.fill_holes, outer_vertex=self.outer_vertex)
 
     @property
     def mesh(self) -> TriangleMesh:
-        """The mesh in order."""
-        return self.cleaned.mesh
+        """The mesh in order, made fair where it is rough: what everything is computed on."""
+        return self.flattening.mesh
 
     def descriptors(self, progress: Callable[[float], None] | None = None) -> Floats:
         """Return the standardised descriptors of all vertices, (n, d).
@@ -100,7 +101,9 @@ class Surface:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
-        return (*cleaning_notes(self.cleaned), *opening_notes(self.flattening))
+        rough = f"'{self.mesh.name}' is rough or noisy: smoothed, for the computation only"
+        smoothed = (rough,) if self.mesh is not self.cleaned.mesh else ()
+        return (*cleaning_notes(self.cleaned), *smoothed, *opening_notes(self.flattening))
 
 
 def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:

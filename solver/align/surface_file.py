@@ -22,8 +22,8 @@ def save_surface(path: Path | str, surface: Surface) -> None:
 
     Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came; kept (k,) int,
     reversed (k,) bool and changes, text, of the faces put in order; fill_holes, largest_part, outer_vertex (-1: none);
-    disc (n,) complex; boundary, holes one after another and hole_sizes; flips_repaired; descriptors (n, d); and
-    source_COUNT and target_COUNT, the points chosen for each count.
+    computed (n, 3), the vertices as they are computed with; disc (n,) complex; boundary, holes one after another and
+    hole_sizes; flips_repaired; descriptors (n, d); and source_COUNT and target_COUNT, the points chosen for each count.
     """
     tidy, flat = surface.cleaned, surface.flattening
     chosen = {f"{role}_{count}": points for role, counts in surface.points.items() for count, points in counts.items()}
@@ -41,6 +41,7 @@ def save_surface(path: Path | str, surface: Surface) -> None:
             fill_holes=surface.fill_holes,
             largest_part=surface.largest_part,
             outer_vertex=-1 if surface.outer_vertex is None else surface.outer_vertex,
+            computed=flat.mesh.vertices,
             disc=flat.disc,
             boundary=flat.boundary,
             holes=np.concatenate([np.empty(0, np.intp), *flat.holes]),
@@ -93,6 +94,11 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
         mesh = TriangleMesh(original.vertices, faces, original.name)
     else:
         _require(len(kept) == count and not turned.any(), "faces put in order")
+    computed = stored["computed"]
+    _require(computed.shape == mesh.vertices.shape, "the vertices as they are computed with")
+    flat_mesh = mesh
+    if not np.array_equal(computed, mesh.vertices):
+        flat_mesh = TriangleMesh(computed, mesh.faces, mesh.name)
     disc = stored["disc"].astype(np.complex128, casting="safe")
     _require(disc.shape == (size,) and (np.isfinite(disc) == mesh.used).all(), "the disc")
     _require(bool((np.abs(disc[mesh.used]) <= 1 + 1e-12).all()), "the disc")
@@ -100,7 +106,7 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     holes = _indices(stored["holes"], size)
     _require(len(holes) == (ends[-1] if len(ends) else 0), "openings")
     flat = Flattening(
-        mesh,
+        flat_mesh,
         disc,
         _indices(stored["boundary"], size),
         tuple(np.split(holes, ends[:-1])) if len(ends) else (),
