@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult, search
@@ -26,7 +25,7 @@ def roughly_aligned(
     target_surface: Surface,
     settings: AlignSettings,
     clock: Part,
-    landmarks: npt.ArrayLike | None,
+    landmarks: Integers | None,
 ) -> Alignment:
     """Flatten, search, and refine the transformation; of prepared surfaces the rest is there already."""
     clock.begin("flatten source", "Flattening the source", 0.0)
@@ -47,7 +46,7 @@ def roughly_aligned(
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
     )
-    pairs, warnings = usable_landmarks(() if landmarks is None else landmarks, source, target)
+    pairs, warnings = usable_landmarks(landmarks, source, target)
     if len(pairs):
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
@@ -69,6 +68,7 @@ def roughly_aligned(
         settings=settings,
         other=other,
         source_cleaned=source_surface.cleaned,
+        target_cleaned=target_surface.cleaned,
     )
     clock.begin("rival", "Looking for a rival", 0.75)
     near = settings.reflect_margin * len(source_samples)

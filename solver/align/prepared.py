@@ -12,13 +12,17 @@ import numpy as np
 
 from ..flatten.flatten import Flattening, flatten
 from ..stages import Progress, Stages
-from ..surface.cleaning import Cleaned, in_order
+from ..surface.cleaning import Cleaned, cleaned
 from ..surface.descriptors import diffused_curvatures
-from ..surface.mesh import Floats, Integers, TriangleMesh, plural
+from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
 from .objective import interior, source_points
 from .settings import AlignSettings
+
+
+FEWEST = 3
+"""Vertices inside the disc that a surface needs: a Möbius transformation has three parameters."""
 
 
 class Surface:
@@ -34,6 +38,10 @@ class Surface:
         A vertex on the outer boundary; None: the longest boundary is.
     largest_part : bool
         Whether all parts but the one of largest area are left out.
+    keys : (n, d) float64 or None
+        Further coordinates of the vertices; see `surface.cleaned`.
+    tidy : Cleaned or None
+        The mesh in order, if it is already.
     """
 
     def __init__(
@@ -43,9 +51,12 @@ class Surface:
         fill_holes: bool = False,
         outer_vertex: int | None = None,
         largest_part: bool = False,
+        keys: Floats | None = None,
+        tidy: Cleaned | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
+        self.keys, self.tidy = keys, tidy
         self._descriptors: Floats | None = None
         self._source_points: dict[int, Integers] = {}
         self._target_points: dict[int, Integers] = {}
@@ -53,12 +64,15 @@ class Surface:
     @cached_property
     def cleaned(self) -> Cleaned:
         """The mesh, put in order for the computation; raises `MeshError`."""
-        return in_order(self.original, largest_part=self.largest_part)
+        if self.tidy is not None:
+            return self.tidy
+        return cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
 
     @cached_property
     def flattening(self) -> Flattening:
         """Of the mesh in order; raises `MeshError`."""
-        return flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=self.outer_vertex)
+        outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
+        return flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=outer)
 
     @property
     def mesh(self) -> TriangleMesh:
@@ -78,15 +92,26 @@ class Surface:
     def source_points(self, count: int) -> Integers:
         """Return up to `count` vertices that stand for it as a source."""
         if count not in self._source_points:
+            self._require_inside()
             self._source_points[count] = source_points(self.flattening, self.descriptors(), count)
         return self._source_points[count]
 
     def target_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
         """Return up to `count` vertices that stand for it as a target; `progress` as for `descriptors`."""
         if count not in self._target_points:
+            self._require_inside()
             nowhere = np.empty(0, np.intp)
             self._target_points[count] = farthest_points(self.mesh, count, nowhere, interior(self.flattening), progress)
         return self._target_points[count]
+
+    def _require_inside(self) -> None:
+        """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
+        inside = int(interior(self.flattening).sum())
+        if inside < FEWEST:
+            raise MeshError(
+                f"'{self.mesh.name}' has {plural(inside, 'vertex')} inside its boundary, and {FEWEST} are the fewest "
+                "that tell how it lies: subdivide it"
+            )
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -113,7 +138,8 @@ def prepare(
     settings: AlignSettings | None = None,
     *,
     outer_vertex: int | None = None,
-    largest_part: bool = False,
+    largest_part: bool = True,
+    keys: Floats | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -121,13 +147,15 @@ def prepare(
     Parameters
     ----------
     mesh : TriangleMesh
-        A triangulated disc; faces used twice or turned round are put in order.
+        A surface that `surface.cleaned` can make a disc.
     settings : AlignSettings, optional
         `fill_holes`, `samples` and `targets` count.
     outer_vertex : int, optional
         A vertex on the loop that is to be the outer one, for `fill_holes`; by default the longest loop is.
     largest_part : bool
         Leave out all parts but the one of largest area.
+    keys : (n, d) float64, optional
+        Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
     progress : callable, optional
         As for `align`.
 
@@ -142,7 +170,7 @@ def prepare(
     clock = Stages(progress)
     whole = clock.part(0, 1)
     whole.begin("flatten", "Flattening", 0.0)
-    surface = Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part)
+    surface = Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part, keys=keys)
     _ = surface.flattening
     whole.begin("descriptors", "Measuring curvature", 0.3)
     surface.descriptors(whole.within(0.3, 0.6))

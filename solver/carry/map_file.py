@@ -16,6 +16,13 @@ def save_map(path: Path | str, alignment: Alignment, correspondence: Corresponde
     Arrays: face (n_target,) int, barycentric (n_target, 3), matched (n_target,) bool, confidence (n_target,),
     source_triangles (m, 3) int, source_size, source_disc and target_disc complex, z complex, theta, reflected.
     """
+    source_disc, target_disc = (
+        flattening.disc if tidy is None else tidy.at_vertices(flattening.disc, np.nan)
+        for flattening, tidy in (
+            (alignment.source, alignment.source_cleaned),
+            (alignment.target, alignment.target_cleaned),
+        )
+    )
     with Path(path).open("wb") as file:
         np.savez_compressed(
             file,
@@ -25,8 +32,8 @@ def save_map(path: Path | str, alignment: Alignment, correspondence: Corresponde
             confidence=correspondence.confidence,
             source_triangles=correspondence.source_triangles,
             source_size=correspondence.source_size,
-            source_disc=alignment.source.disc,
-            target_disc=alignment.target.disc,
+            source_disc=source_disc,
+            target_disc=target_disc,
             z=alignment.mobius.z,
             theta=alignment.mobius.theta,
             reflected=alignment.mobius.reflected,

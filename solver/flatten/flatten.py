@@ -17,7 +17,7 @@ from .circle import on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
-from .injective import untangled
+from .injective import require_injective, untangled
 from .mid_edge import mid_edge_map
 
 METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map, "circle-packing": packed}
@@ -85,7 +85,8 @@ def flatten(
     Raises
     ------
     MeshError
-        The mesh is no disc, `outer_vertex` is on none of its boundary loops, or the mesh is too coarse for the method.
+        The mesh is no disc, `outer_vertex` is on none of its boundary loops, the mesh is too coarse for the method, or
+        so deep or narrow somewhere that numbers cannot tell its triangles apart in the disc.
     ValueError
         An unknown method.
     """
@@ -103,6 +104,7 @@ def flatten(
     turned = _turned(disc, mesh)
     if turned:
         disc = untangled(surface.faces, surface.lengths, disc, boundary)
+    require_injective(mesh, disc[: len(mesh.vertices)])
     result = np.full(len(mesh.vertices), complex(np.nan, np.nan))
     result[mesh.used] = disc[: len(result)][mesh.used]
     return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh))
