@@ -1,4 +1,4 @@
-"""`check`: what each mesh is, and what would make it a disc."""
+"""`check`: what each mesh is, and what will be done about it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 from ..streams import DONE, NOT_ALIGNED, UNUSABLE, say, say_error
 from .mesh_options import MESH_HELP
 
-HELP = "Say what each mesh is, and what would make it a disc."
+HELP = "Say what each mesh is, and what will be done about it."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
-    from ...solver import MeshError, topology
+    from ...solver import MeshError, verdict
     from ..files import Unreadable, import_meshes, new_scene, split_object_name
     from ..mesh_data import read_surface
 
@@ -37,11 +37,10 @@ def run(options: argparse.Namespace) -> int:
         for imported in chosen:
             name = argument if len(chosen) == 1 else f"{path}:{imported.name}"
             try:
-                what = topology(read_surface(imported.obj, name).mesh)
-                line, is_disc = what.describe(), what.is_disc
+                surface = read_surface(imported.obj, name)
+                line = verdict(surface.mesh, keys=surface.keys).describe()
             except MeshError as error:
-                line, is_disc = "not a disc: it " + str(error).removeprefix(f"'{name}' "), False
-            say(f"{name}: {line}")
-            if not is_disc:
+                line = "cannot be used: it " + str(error).removeprefix(f"'{name}' ")
                 status = max(status, NOT_ALIGNED)
+            say(f"{name}: {line}")
     return status

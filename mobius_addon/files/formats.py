@@ -12,7 +12,6 @@ import addon_utils
 
 from ..attributes import KINDS
 from ..mesh_data import Refusal
-from .joining import join_along_seams, join_coinciding
 
 
 class Unreadable(Refusal):
@@ -29,14 +28,11 @@ class Format:
         Read a path into the scene; write the selected objects to a path.
     keeps : frozenset of str
         The kinds of `attributes.KINDS` that such a file can hold.
-    join : callable
-        Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
 
     importer: Callable[[str], object]
     exporter: Callable[[str], object]
     keeps: frozenset[str]
-    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
@@ -81,7 +77,6 @@ _PLY = Format(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors="SRGB"
     ),
     frozenset({"colors", "uv", "attributes"}),
-    join_along_seams,
 )
 _STL = Format(
     lambda path: bpy.ops.wm.stl_import(filepath=path),
@@ -92,7 +87,6 @@ _GLTF = Format(
     lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path),
     _save_gltf,
     frozenset({"colors", "uv"}),
-    join_coinciding,
 )
 _FBX = Format(
     lambda path: _operator("import_scene.fbx", "io_scene_fbx")(filepath=path),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -29,19 +29,14 @@ class Imported:
         The object's name there; the scene's other objects may force another on it.
     obj : bpy.types.Object
         The object.
-    joined : int
-        Vertices that were joined with others at the very same place.
     """
 
     path: Path
     name: str
     obj: bpy.types.Object
-    joined: int = 0
 
     def order_change(self) -> str | None:
         """Return why the object's vertices are not numbered as in the file, or None if they are."""
-        if self.joined:
-            return f"{self.joined:,} that repeat another one's place were joined with it"
         if self.path.suffix.lower() == ".obj":
             with self.path.open("rb") as lines:
                 dropped = sum(line.startswith(b"v ") for line in lines) - len(self.obj.data.vertices)
@@ -80,7 +75,7 @@ def import_meshes(path: Path) -> list[Imported]:
         for obj, name in before.items():
             obj.name = name
     bpy.context.view_layer.update()
-    meshes = [replace(x, joined=form.join(x.obj.data)) for x in found if x.obj.type == "MESH"]
+    meshes = [x for x in found if x.obj.type == "MESH"]
     if not meshes:
         raise Unreadable(f"'{path}' holds no mesh")
     return sorted(meshes, key=lambda imported: imported.name)

@@ -12,6 +12,7 @@ from ..search.branch_and_bound import SearchResult, search
 from ..search.matching import Objective
 from ..search.rival import Rival, best_rival
 from ..stages import Cancelled, Part
+from ..surface.mesh import Integers
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility, covering_radius

@@ -17,9 +17,9 @@ from ..surface.descriptors import diffused_curvatures
 from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
+from ..surface.verdict import closing
 from .objective import interior, source_points
 from .settings import AlignSettings
-
 
 FEWEST = 3
 """Vertices inside the disc that a surface needs: a Möbius transformation has three parameters."""
@@ -126,11 +126,7 @@ def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
 
 def opening_notes(found: Flattening) -> tuple[str, ...]:
     """Say which openings were closed for the computation."""
-    if not found.holes:
-        return ()
-    edges = ", ".join(f"{len(loop):,}" for loop in found.holes[:6]) + (", ..." if len(found.holes) > 6 else "")
-    number = plural(len(found.holes), "opening")
-    return (f"'{found.mesh.name}': {number} ({edges} edges) closed, for the computation only",)
+    return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
 
 
 def prepare(
@@ -170,7 +166,9 @@ def prepare(
     clock = Stages(progress)
     whole = clock.part(0, 1)
     whole.begin("flatten", "Flattening", 0.0)
-    surface = Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part, keys=keys)
+    surface = Surface(
+        mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part, keys=keys
+    )
     _ = surface.flattening
     whole.begin("descriptors", "Measuring curvature", 0.3)
     surface.descriptors(whole.within(0.3, 0.6))

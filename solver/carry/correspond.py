@@ -66,9 +66,8 @@ def correspond(alignment: Alignment) -> Correspondence:
         triangles, size = tidy.original_faces, tidy.size
         face, barycentric = _in_own_triangles(face, barycentric, tidy)
     if (tidy := alignment.target_cleaned) is not None and tidy.changes:
-        face, barycentric, confidence = (
-            tidy.at_vertices(values, absent) for values, absent in ((face, -1), (barycentric, 0), (confidence, 0))
-        )
+        face, barycentric = tidy.at_vertices(face, -1), tidy.at_vertices(barycentric, 0)
+        confidence = tidy.at_vertices(confidence, 0)
     return Correspondence(
         face=face,
         barycentric=barycentric,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,9 @@ TINY = 1e-9
 
 CUT_OPEN = 0.4
 """Share of a closed surface's area from which on a part that was cut out of it along its edges is taken as it is."""
+
+
+Value = TypeVar("Value", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +76,7 @@ class Cleaned:
         """Vertices of the original."""
         return len(self.vertex_of)
 
-    def at_vertices(self, values: npt.NDArray[np.generic], absent: complex) -> npt.NDArray[np.generic]:
+    def at_vertices(self, values: npt.NDArray[Value], absent: complex) -> npt.NDArray[Value]:
         """Return values, (n, ...), at the original's vertices, (n_original, ...); `absent` where it has none."""
         if not self.changes:
             return values
@@ -80,7 +84,7 @@ class Cleaned:
         result[self.vertex_of < 0] = absent
         return result
 
-    def at_corners(self, values: npt.NDArray[np.generic], absent: complex) -> npt.NDArray[np.generic]:
+    def at_corners(self, values: npt.NDArray[Value], absent: complex) -> npt.NDArray[Value]:
         """Return values, (n, ...), at the corners of the original's faces, (m_original, 3, ...)."""
         result = np.full((len(self.original_faces), 3, *values.shape[1:]), absent, values.dtype)
         own = values[self.mesh.faces]
@@ -98,10 +102,12 @@ class Cleaned:
         return int(self.vertices_for(np.array([original]))[0]) if 0 <= original < self.size else original
 
     def area_at_vertices(self) -> Floats:
-        """Return the area around each original vertex, (n_original,), of what was kept; all of it at the first of
-        several that became one."""
+        """Return the area around each original vertex, (n_original,), of what was kept.
+
+        The first of several that became one has all of it.
+        """
         areas = self.mesh.vertex_areas
-        return np.bincount(self.origin, areas, self.size) if self.changes else areas
+        return np.bincount(self.origin, areas, self.size).astype(np.float64, copy=False) if self.changes else areas
 
 
 def cleaned(
@@ -148,11 +154,6 @@ def cleaned(
     if fill_holes:
         work.cut_handles(glue)
     return work.result()
-
-
-def in_order(mesh: TriangleMesh, **asked: bool) -> Cleaned:
-    """Return `cleaned` of a mesh."""
-    return cleaned(mesh, **asked)
 
 
 class _Work:

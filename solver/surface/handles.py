@@ -8,6 +8,8 @@ that was found are tried in turn, so that it shrinks to the waist of its handle.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
@@ -25,9 +27,7 @@ ROUNDS = 6
 """From one loop to a shorter one."""
 
 
-def cut_handles(
-    mesh: TriangleMesh, glue: Glue, count: int
-) -> tuple[list[float], Integers, Integers, Integers]:
+def cut_handles(mesh: TriangleMesh, glue: Glue, count: int) -> tuple[list[float], Integers, Integers, Integers]:
     """Cut an oriented manifold surface along a loop around each of its handles, which leaves two openings of each.
 
     Returns
@@ -131,5 +131,5 @@ class _Graph:
             one.pop()
             other.pop()
         loop = np.array(one[:-1] + other[::-1], np.intp)
-        lengths = [self.edges[a, b] for a, b in zip(loop[:-1], loop[1:], strict=True)]
+        lengths = [self.edges[a, b] for a, b in pairwise(loop.tolist())]
         return loop, float(sum(lengths) + self.length[edge])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh import Floats, MeshError, TriangleMesh
+from .mesh import MeshError, TriangleMesh
 
 FAR = 1e4
 """Distance from the origin, in diagonals, from which on a mesh is moved there."""
