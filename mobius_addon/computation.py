@@ -22,7 +22,7 @@ from ..solver import (
     flatten,
     topology,
 )
-from ..solver.align.prepared import cleaning_notes, opening_notes
+from ..solver.align.prepared import cleaning_notes, flattening_notes
 from ..solver.surface.mesh import Booleans, Floats, Integers
 from .kept_surfaces import surface_of
 from .mesh_data import Refusal
@@ -97,7 +97,7 @@ def flattened(
     tidy = in_order(mesh, repair, keys)
     vertex = None if outer is None else tidy.vertex_for(outer)
     found = flatten(tidy.mesh, method, fill_holes=repair.fill_holes, outer_vertex=vertex)
-    return Flat(found, tidy, (*cleaning_notes(tidy), *opening_notes(found)))
+    return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found)))
 
 
 def aligned(

@@ -42,7 +42,8 @@ def require_room(obj: bpy.types.Object, layouts: Sequence[str], colors: Sequence
 def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Surface) -> None:
     """Write points of the unit disc as a UV map, uv = (disc + 1) / 2, and make it the active one.
 
-    `disc`, (m, 3), is at the triangles' corners. Faces that have no place in the disc, nan, are put into its corner (0, 0), outside the disc.
+    `disc`, (m, 3), is at the triangles' corners. Faces that have no place in the disc, nan, are put into its corner
+    (0, 0), outside the disc.
 
     Raises
     ------

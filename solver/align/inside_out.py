@@ -19,16 +19,19 @@ from .mobius_map import roughly_aligned
 from .prepared import Surface
 from .reconsider import DOUBTFUL
 
+MOSTLY = 0.6
+"""Mean confidence over the whole target, 0 where it has no counterpart, up to which the other side is tried."""
+
 
 def turned_round(
     found: Alignment, source: Surface, target: Surface, clock: Part, landmarks: Integers | None
 ) -> tuple[Alignment, Surface] | None:
     """Return what comes of a doubtful map if the target is turned inside out, and it so; None where that is no better.
 
-    Its samples have to match better by `AlignSettings.reflect_margin`, before it is bent, and more of its map has to be
-    sure than of the other, after.
+    Doubtful is also one that leaves much of the target without a counterpart. Its samples have to match better by
+    `AlignSettings.reflect_margin`, before it is bent, and more of its map has to be sure than of the other, after.
     """
-    if found.mean_confidence > DOUBTFUL:
+    if found.mean_confidence > DOUBTFUL and _sure(found) > MOSTLY:
         return None
     part = clock.part(0.0, 0.5, "inside out")
     part.begin("inside out", "Trying the other side", 0.0)
@@ -43,13 +46,18 @@ def turned_round(
         return None
     part = clock.part(0.5, 1.0, "inside out")
     other = bent_densely(matched, drafted_from(matched, part), part, landmarks)
-    if other.mean_confidence <= max(DOUBTFUL, found.mean_confidence):
+    if _sure(other) <= max(DOUBTFUL, _sure(found)):
         return None
     one, two = found.source, found.target
     if _bulge(one) < 0 <= _bulge(two):
         one, two = two, one
     said = f"'{two.mesh.name}' seems to be inside out beside '{one.mesh.name}': turned for the computation only"
     return replace(other, warnings=(said, *other.warnings)), turned
+
+
+def _sure(found: Alignment) -> float:
+    """Return the mean confidence over the target's whole area."""
+    return float(found.confidence @ found.target.mesh.vertex_areas / found.target.mesh.area)
 
 
 def _bulge(flattening: Flattening) -> float:

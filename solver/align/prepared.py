@@ -21,6 +21,9 @@ from ..surface.verdict import closing
 from .objective import interior, source_points
 from .settings import AlignSettings
 
+LITTLE = 0.02
+"""Share of the rim in the disc without its angles that is not worth a word."""
+
 FEWEST = 3
 """Vertices inside the disc that a surface needs: a Möbius transformation has three parameters."""
 
@@ -116,7 +119,7 @@ class Surface:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
-        return (*cleaning_notes(self.cleaned), *opening_notes(self.flattening))
+        return (*cleaning_notes(self.cleaned), *flattening_notes(self.flattening))
 
 
 def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
@@ -124,8 +127,13 @@ def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
     return (f"'{tidy.mesh.name}': {', '.join(tidy.changes)}, for the computation only",) if tidy.changes else ()
 
 
-def opening_notes(found: Flattening) -> tuple[str, ...]:
-    """Say which openings were closed for the computation."""
+def flattening_notes(found: Flattening) -> tuple[str, ...]:
+    """Say which openings were closed for the computation, and where the disc is too narrow for the surface."""
+    lost = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
+    return (*_opening_notes(found), *((lost,) if found.rim_lost > LITTLE else ()))
+
+
+def _opening_notes(found: Flattening) -> tuple[str, ...]:
     return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
 
 

@@ -13,7 +13,7 @@ from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
-from .circle import on_circle
+from .circle import on_circle, require_rim
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
@@ -40,6 +40,8 @@ class Flattening:
         Boundary loops that were closed for the computation; nothing is mapped to what they enclose.
     flips_repaired : int
         Triangles that were turned over in the conformal map and put right by moving the vertices around them.
+    rim_lost : float
+        Share of the outer boundary's length, in [0, 1], where numbers cannot carry its angles: see `circle.lost_rim`.
     """
 
     mesh: TriangleMesh
@@ -47,6 +49,7 @@ class Flattening:
     boundary: Integers
     holes: tuple[Integers, ...] = ()
     flips_repaired: int = 0
+    rim_lost: float = 0.0
 
     @cached_property
     def distortion(self) -> Distortion:
@@ -98,6 +101,7 @@ def flatten(
         disc = METHODS[method](surface, boundary)
     except ValueError as reason:
         raise MeshError(f"'{mesh.name}' is too coarse for the method '{method}': {reason}") from reason
+    lost = require_rim(mesh, disc, boundary)
     disc = _centred(disc, mesh)
     disc[boundary] = on_circle(disc[boundary])
 
@@ -107,7 +111,7 @@ def flatten(
     require_injective(mesh, disc[: len(mesh.vertices)])
     result = np.full(len(mesh.vertices), complex(np.nan, np.nan))
     result[mesh.used] = disc[: len(result)][mesh.used]
-    return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh))
+    return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh), lost)
 
 
 def _centred(disc: Complexes, mesh: TriangleMesh) -> Complexes:

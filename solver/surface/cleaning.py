@@ -68,8 +68,7 @@ class Cleaned:
     def turned(self) -> Cleaned:
         """Return it with all faces turned round."""
         mesh = TriangleMesh(self.mesh.vertices, self.mesh.faces[:, [0, 2, 1]], self.mesh.name)
-        said = (*self.changes, "turned inside out")
-        return replace(self, mesh=mesh, reversed=~self.reversed, changes=said)
+        return replace(self, mesh=mesh, reversed=~self.reversed)
 
     @property
     def size(self) -> int:

@@ -112,7 +112,8 @@ class _Graph:
         _, first = np.unique(low * nodes + high, return_index=True)
         first = first[low[first] != high[first]]
         rank = np.arange(len(free)) + 1.0
-        tree = minimum_spanning_tree(csr_array((rank[first], (low[first], high[first])), shape=(nodes, nodes)))
+        ends = low[first].astype(np.int32), high[first].astype(np.int32)  # what scipy's trees take
+        tree = minimum_spanning_tree(csr_array((rank[first], ends), shape=(nodes, nodes)))
         left = np.ones(len(free), bool)
         left[tree.data.astype(np.intp) - 1] = False
         found = [self._loop(int(edge), before) for edge in free[left][::-1][:most]]
