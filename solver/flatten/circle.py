@@ -57,8 +57,8 @@ def require_rim(mesh: TriangleMesh, disc: Complexes, boundary: Integers) -> floa
         wide = (length := _rim_length(mesh, boundary)) ** 2 / (4 * mesh.area)
         raise MeshError(
             f"'{mesh.name}' is too long and narrow for a disc, about 1:{wide:.0f} (its rim of {length:.3g} around an "
-            f"area of {mesh.area:.3g}): {100 * lost:.0f} % of the rim would fall together in points; cut it into pieces "
-            "that are at most ten times as long as wide"
+            f"area of {mesh.area:.3g}): {100 * lost:.0f} % of the rim would fall together in points; cut it into "
+            "pieces that are at most ten times as long as wide"
         )
     return lost
 

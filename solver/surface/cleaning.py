@@ -84,8 +84,11 @@ class Cleaned:
         return result
 
     def at_corners(self, values: npt.NDArray[Value], absent: complex) -> npt.NDArray[Value]:
-        """Return values, (n, ...), at the corners of the original's faces, (m_original, 3, ...)."""
-        result = np.full((len(self.original_faces), 3, *values.shape[1:]), absent, values.dtype)
+        """Return values, (n, ...), at the corners of the original's faces, (m_original, 3, ...).
+
+        Faces that were left out, such as duplicates, have those of their vertices.
+        """
+        result = self.at_vertices(values, absent)[self.original_faces]
         own = values[self.mesh.faces]
         own[self.reversed] = own[self.reversed][:, [0, 2, 1]]
         result[self.faces] = own

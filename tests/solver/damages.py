@@ -198,7 +198,8 @@ def handle(old: Damaged, rng: np.random.Generator) -> Damaged:
     faces, centre = old.mesh.faces, old.mesh.vertices[old.mesh.faces].mean(axis=1)
     away = np.setdiff1d(np.arange(len(faces)), np.flatnonzero(~np.isin(faces, _inside(old.mesh)).all(axis=1)))
     one = int(rng.choice(away))
-    free = away[~np.isin(faces[away], faces[one]).any(axis=1)]
+    around = np.unique(faces[np.isin(faces, faces[one]).any(axis=1)])
+    free = away[~np.isin(faces[away], around).any(axis=1)]
     two = int(free[np.argsort(np.linalg.norm(centre[free] - centre[one], axis=1))[3]])
     a, b = faces[one], faces[two][[0, 2, 1]]
     b = np.roll(b, -int(np.argmin(np.linalg.norm(old.mesh.vertices[b] - old.mesh.vertices[a[0]], axis=1))))
