@@ -2,8 +2,8 @@
 
 Erickson and Whittlesey, "Greedy Optimal Homotopy and Homology Generators" (2005): with a tree of shortest paths from a
 vertex and a spanning tree of the faces that crosses none of its edges, 2 g edges are left on a surface of genus g. Each
-closes a loop that does not bound, and those are the shortest through that vertex. Loops through the vertices of a loop
-that was found are tried in turn, so that it shrinks to the waist of its handle.
+closes a loop that does not bound, and those are the shortest through that vertex. The shortest of all crosses one of
+them, so that vertices on these are tried next.
 """
 
 from __future__ import annotations
@@ -20,11 +20,14 @@ from .mesh import Floats, Integers, TriangleMesh, directed_edges
 LARGEST_LOOP = 0.5
 """Length of a loop, in roots of the area, up to which a handle is cut along it."""
 
-MOST = 40
+MOST = 20
 """Handles up to which a surface is cut open; more are a fault of how it was made."""
 
-ROUNDS = 6
+ROUNDS = 4
 """From one loop to a shorter one."""
+
+FEWEST_ROOTS, MOST_ROOTS, WORK = 4, 24, 400_000
+"""Vertices through which loops are looked for in a round, fewer on large surfaces."""
 
 
 def cut_handles(mesh: TriangleMesh, glue: Glue, count: int) -> tuple[list[float], Integers, Integers, Integers]:
@@ -63,18 +66,19 @@ def _sides_along(faces: Integers, glue: Glue, loop: Integers) -> Integers:
 def _shortest_loop(positions: Floats, faces: Integers, glue: Glue) -> tuple[Integers, float]:
     """Return a loop, as vertices in order, that does not bound, about the shortest, and its length."""
     graph = _Graph(positions, faces, glue)
-    best, length = np.empty(0, np.intp), np.inf
     loops = graph.loops_through(int(faces[0, 0]))
-    for start, size in loops[:4]:
-        loop = start
-        for _ in range(ROUNDS):
-            again = [graph.loops_through(int(loop[k]), 1) for k in {0, len(loop) // 3, 2 * len(loop) // 3}]
-            shorter, shorter_size = min((found[0] for found in again if found), key=lambda x: x[1])
-            if shorter_size >= size * (1 - 1e-9):
-                break
-            loop, size = shorter, shorter_size
-        if size < length:
-            best, length = loop, size
+    roots = max(FEWEST_ROOTS, min(MOST_ROOTS, WORK // len(positions)))
+    best, length = loops[0] if loops else (np.empty(0, np.intp), np.inf)
+    for _ in range(ROUNDS):
+        on_loops = np.concatenate([loop for loop, _ in loops]) if loops else best
+        some = on_loops[np.unique(np.linspace(0, len(on_loops) - 1, roots).astype(int))]
+        again = [found for root in some.tolist() if (found := graph.loops_through(root))]
+        if not again:
+            break
+        loops = min(again, key=lambda found: found[0][1])
+        if loops[0][1] >= length * (1 - 1e-9):
+            break
+        best, length = loops[0]
     return best, float(length)
 
 
@@ -98,7 +102,7 @@ class _Graph:
         weight = np.maximum(np.concatenate([self.length, self.length]), np.finfo(float).tiny)
         self.edges = csr_array(coo_array((weight, both), shape=(n, n)))
 
-    def loops_through(self, root: int, most: int | None = None) -> list[tuple[Integers, float]]:
+    def loops_through(self, root: int) -> list[tuple[Integers, float]]:
         """Return loops that do not bound, shortest first, from the shortest paths from a vertex."""
         distance, before = dijkstra(self.edges, directed=False, indices=root, return_predecessors=True)
         start, stop = self.start, self.stop
@@ -116,7 +120,7 @@ class _Graph:
         tree = minimum_spanning_tree(csr_array((rank[first], ends), shape=(nodes, nodes)))
         left = np.ones(len(free), bool)
         left[tree.data.astype(np.intp) - 1] = False
-        found = [self._loop(int(edge), before) for edge in free[left][::-1][:most]]
+        found = [self._loop(int(edge), before) for edge in free[left][::-1]]
         return sorted(found, key=lambda x: x[1])
 
     def _loop(self, edge: int, before: Integers) -> tuple[Integers, float]:

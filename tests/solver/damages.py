@@ -104,6 +104,8 @@ def islands(old: Damaged, rng: np.random.Generator) -> Damaged:
 def _path(mesh: TriangleMesh, rng: np.random.Generator, most: int = 25) -> np.ndarray:
     """Vertices inside, in order, along a shortest way."""
     inside = _inside(mesh)
+    if not inside.size:
+        return inside
     begin = int(rng.choice(inside))
     distance, before = dijkstra(edge_graph(mesh), indices=begin, return_predecessors=True)
     reached = inside[np.isfinite(distance[inside])]
@@ -184,8 +186,10 @@ def pinholes(old: Damaged, rng: np.random.Generator) -> Damaged:
 def bow_ties(old: Damaged, rng: np.random.Generator) -> Damaged:
     """Two faces missing that touch in one vertex."""
     faces = old.mesh.faces
+    if not (inside := _inside(old.mesh)).size:
+        return old
     for _ in range(3):
-        v = int(rng.choice(_inside(old.mesh)))
+        v = int(rng.choice(inside))
         around = np.flatnonzero((faces == v).any(axis=1))
         for f in around[1:]:
             if len(np.intersect1d(faces[f], faces[around[0]])) == 1:
@@ -197,9 +201,13 @@ def handle(old: Damaged, rng: np.random.Generator) -> Damaged:
     """A thin tube between two faces that are near each other."""
     faces, centre = old.mesh.faces, old.mesh.vertices[old.mesh.faces].mean(axis=1)
     away = np.setdiff1d(np.arange(len(faces)), np.flatnonzero(~np.isin(faces, _inside(old.mesh)).all(axis=1)))
+    if not away.size:
+        return old
     one = int(rng.choice(away))
     around = np.unique(faces[np.isin(faces, faces[one]).any(axis=1)])
     free = away[~np.isin(faces[away], around).any(axis=1)]
+    if len(free) < 4:
+        return old
     two = int(free[np.argsort(np.linalg.norm(centre[free] - centre[one], axis=1))[3]])
     a, b = faces[one], faces[two][[0, 2, 1]]
     b = np.roll(b, -int(np.argmin(np.linalg.norm(old.mesh.vertices[b] - old.mesh.vertices[a[0]], axis=1))))
@@ -212,6 +220,8 @@ def edges_without_length(old: Damaged, rng: np.random.Generator) -> Damaged:
     faces, n = old.mesh.faces.copy(), len(old.mesh.vertices)
     mesh = old.mesh
     inner = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
+    if not inner.size:
+        return old
     extra, more, touched = [], [], set()
     for side in rng.choice(inner, 6).tolist():
         f, g = side // 3, int(mesh.twins[side]) // 3
@@ -233,7 +243,10 @@ def edges_without_length(old: Damaged, rng: np.random.Generator) -> Damaged:
 def faces_without_area(old: Damaged, rng: np.random.Generator) -> Damaged:
     """Faces folded flat onto one of their edges: two on each other beside it."""
     mesh, n = old.mesh, len(old.mesh.vertices)
-    side = int(rng.choice(np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))))
+    inner = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
+    if not inner.size:
+        return old
+    side = int(rng.choice(inner))
     f, k = divmod(side, 3)
     a, b = int(mesh.faces[f][(k + 1) % 3]), int(mesh.faces[f][(k + 2) % 3])
     faces = mesh.faces.copy()
@@ -253,7 +266,10 @@ def duplicate_faces(old: Damaged, rng: np.random.Generator) -> Damaged:
 def inner_faces(old: Damaged, rng: np.random.Generator) -> Damaged:
     """A wall that stands on inner edges."""
     mesh, n = old.mesh, len(old.mesh.vertices)
-    side = int(rng.choice(np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))))
+    inner = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
+    if not inner.size:
+        return old
+    side = int(rng.choice(inner))
     f, k = divmod(side, 3)
     a, b = int(mesh.faces[f][(k + 1) % 3]), int(mesh.faces[f][(k + 2) % 3])
     up = mesh.face_vectors[f] / np.linalg.norm(mesh.face_vectors[f])
@@ -276,7 +292,9 @@ def some_turned(old: Damaged, rng: np.random.Generator) -> Damaged:
 
 def spikes(old: Damaged, rng: np.random.Generator) -> Damaged:
     """Single vertices far off."""
-    chosen = rng.choice(_inside(old.mesh), 2, replace=False)
+    if (inside := _inside(old.mesh)).size < 2:
+        return old
+    chosen = rng.choice(inside, 2, replace=False)
     vertices = old.mesh.vertices.copy()
     vertices[chosen] += rng.uniform(0.5, 20, (2, 1)) * old.mesh.diagonal * rng.choice([-1, 1], (2, 3))
     return _moved(old, vertices)

@@ -85,7 +85,7 @@ def test_a_repaired_disc_is_the_disc_it_was(damage, seed: int, sheet: TriangleMe
 def test_pinholes_and_bow_ties_become_openings(sheet: TriangleMesh) -> None:
     assert repaired(pinholes, sheet).repairs[-1].endswith("(3, 3, 3 edges) closed")
     found = repaired(bow_ties, sheet)
-    assert found.repairs == ("1 vertex split in which parts touch in a point only", "2 openings (3, 3 edges) closed")
+    assert found.repairs == ("1 vertex split in which parts touch in a point only", "1 opening (6 edges) closed")
     tidy, n = found.tidy, len(sheet.vertices)
     assert len(tidy.origin) == n + 1
     # values at the corners of the faces as they came are those of the fan that each is in
