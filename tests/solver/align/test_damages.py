@@ -4,7 +4,19 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from damages import DAMAGES, Clean, Damage, coarse_numbers, extreme_size, inside_out, spikes, two_sides
+from damages import (
+    DAMAGES,
+    Clean,
+    Damage,
+    Outcome,
+    closed_lips,
+    coarse_numbers,
+    extreme_size,
+    inside_out,
+    mirror_halves,
+    spikes,
+    two_sides,
+)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scans import bumps, posed, remeshed
@@ -20,12 +32,19 @@ def pair() -> Clean:
     return Clean(sheet, remeshed(posed(sheet, 1), 0.7, 2)[0], QUICK)
 
 
-alone = st.tuples(st.sampled_from([x for x in DAMAGES if x is not inside_out]))
-both = st.lists(st.sampled_from([x for x in DAMAGES if x is not inside_out]), min_size=2, max_size=2, unique=True)
+# which side is out only the dense map tells
+PLAIN = [x for x in DAMAGES if x not in (inside_out, mirror_halves)]
+alone = st.tuples(st.sampled_from(PLAIN))
+both = st.lists(st.sampled_from(PLAIN), min_size=2, max_size=2, unique=True)
+
+
+def right(found: Outcome, flaws: tuple[Damage, ...]) -> bool:
+    """Whether the map is that of the clean pair; lips that stay apart are an opening, which the clean pair has not."""
+    return found.kind == "same" or (closed_lips in flaws and found.error < 1)
 
 
 @settings(
-    max_examples=20,
+    max_examples=12,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -39,13 +58,15 @@ def test_a_damaged_pair_has_the_map_of_the_clean_one(
     pair: Clean, flaws: tuple[Damage, ...], side: str, seed: int
 ) -> None:
     found = pair.outcome(flaws, side, seed)
-    assert found.kind in ("same", "refused"), found
+    assert found.kind == "refused" or right(found, flaws), found
     if found.kind == "refused":
         assert coarse_numbers in flaws, found
         assert found.text.startswith("'bumps' lies so far from the origin")
 
 
-@pytest.mark.parametrize("damage", [inside_out, spikes, two_sides, extreme_size], ids=lambda x: x.__name__)
+@pytest.mark.parametrize(
+    "damage", [inside_out, mirror_halves, spikes, two_sides, extreme_size], ids=lambda x: x.__name__
+)
 @pytest.mark.parametrize("side", ["source", "target"])
 def test_what_turns_the_whole_surface_is_found_by_the_dense_map(damage: Damage, side: str) -> None:
     sheet = bumps(900, seed=5)
@@ -60,10 +81,9 @@ def test_what_turns_the_whole_surface_is_found_by_the_dense_map(damage: Damage, 
 def test_real_scans_with_flaws(real_mesh: Callable[[str], TriangleMesh]) -> None:
     source, target = (real_mesh(f"faces_simpop/SIMPOP_{k}.obj") for k in ("01", "10"))
     pair = Clean(source, posed(target, 2), QUICK)
-    for number, damage in enumerate(DAMAGES):
-        if damage not in (inside_out, coarse_numbers):
-            found = pair.outcome([damage], ("source", "target")[number % 2], number)
-            assert found.kind == "same", (damage.__name__, found)
+    for number, damage in enumerate(PLAIN[::2]):
+        found = pair.outcome([damage], ("source", "target")[number % 2], number)
+        assert right(found, (damage,)) or (damage is coarse_numbers and found.kind == "refused"), (damage, found)
 
 
 def test_what_is_told_of_a_damaged_target_is_told_of_its_own_vertices(pair: Clean) -> None:
