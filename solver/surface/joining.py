@@ -18,6 +18,9 @@ from .mesh import Floats, Integers
 TOUCHING = 1e-6
 """Distance, in diagonals, up to which boundary vertices lie in one place; at most a hundredth of the edges there."""
 
+ENOUGH = 0.15
+"""Share of the smaller part's boundary along which parts of other orientation must touch to be joined."""
+
 FOLD = 0.97
 """Cosine of the angle between two faces at an edge, 14 degrees, below which one lies on the other."""
 
@@ -61,7 +64,9 @@ def coinciding(positions: Floats, faces: Integers, glue: Glue, keys: Floats | No
     found = Glue(one[opposed], other[opposed], np.ones(int(opposed.sum()), bool))
     if opposed.all():
         return found
-    return found.with_others(_turned_parts(glue.with_others(found), len(faces), one[~opposed], other[~opposed]))
+    whole = glue.with_others(found)
+    length = np.linalg.norm(positions[stops(faces)] - positions[starts(faces)], axis=1)
+    return found.with_others(_turned_parts(whole, length, one[~opposed], other[~opposed]))
 
 
 def _places(positions: Floats, start: Integers, stop: Integers, keys: Floats | None) -> Integers:
@@ -114,11 +119,20 @@ def _greedily(one: Integers, other: Integers, count: int) -> Integers:
     return np.concatenate([np.flatnonzero(alone), np.array(rows, np.intp)])
 
 
-def _turned_parts(glue: Glue, face_count: int, one: Integers, other: Integers) -> Glue:
-    """Return those pairs of sides that run the same way because a whole part is turned round; none inside a part."""
+def _turned_parts(glue: Glue, length: Floats, one: Integers, other: Integers) -> Glue:
+    """Return those pairs of sides that run the same way because a whole part is turned round.
+
+    None inside a part, and none where parts touch along little of their boundaries, as where both sides of cloth have
+    holes. `length`, (3 m,), is that of each side.
+    """
+    face_count = len(length) // 3
     part = glue.parts(face_count)
     left, right = part[one // 3], part[other // 3]
-    between = left != right
+    rim = glue.single_sides(face_count)
+    around = np.bincount(part[rim // 3], length[rim], minlength=int(part.max()) + 1)
+    _, pair = np.unique(np.minimum(left, right) * len(around) + np.maximum(left, right), return_inverse=True)
+    touching = np.bincount(pair, length[one])[pair]
+    between = (left != right) & (touching > ENOUGH * np.minimum(around[left], around[right]))
     one, other, left, right = one[between], other[between], left[between], right[between]
     count = int(part.max()) + 1
     # parts in both orientations: joining must not make a surface with one side

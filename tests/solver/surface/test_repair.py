@@ -111,6 +111,16 @@ def test_two_sides_of_cloth_are_not_sewn_together(sheet: TriangleMesh) -> None:
         verdict(cloth, largest_part=False)
 
 
+def test_holes_in_both_sides_of_cloth_do_not_join_them(sheet: TriangleMesh) -> None:
+    n, faces = len(sheet.vertices), sheet.faces
+    inner = int(np.flatnonzero((sheet.twins.reshape(-1, 3) >= 0).all(axis=1))[0])
+    beside = int(sheet.twins[3 * inner]) // 3
+    back = np.delete(faces, beside, axis=0)[:, [0, 2, 1]] + n
+    both = np.concatenate([np.delete(faces, inner, axis=0), back])
+    cloth = TriangleMesh(np.concatenate([sheet.vertices] * 2), both, "Cloth")
+    assert verdict(cloth).repairs == ("1 smaller part left out", "1 opening (3 edges) closed")
+
+
 def test_a_surface_that_was_cut_open_on_purpose_stays_open() -> None:
     """A globe cut along half a meridian: joined it would be closed again."""
     n, m = 12, 16
