@@ -24,6 +24,10 @@ from .settings import AlignSettings
 LITTLE = 0.02
 """Share of the rim in the disc without its angles that is not worth a word."""
 
+LOST = 0.35
+"""Share of the rim in the disc without its angles from which on nothing is aligned: bands of 1:12 have 0.32 and are
+still aligned right, of 1:14 0.41 and are not."""
+
 FEWEST = 3
 """Vertices inside the disc that a surface needs: a Möbius transformation has three parameters."""
 
@@ -73,9 +77,15 @@ class Surface:
 
     @cached_property
     def flattening(self) -> Flattening:
-        """Of the mesh in order; raises `MeshError`."""
+        """Of the mesh in order; raises `MeshError`, as for what is too long for a disc."""
         outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
-        return flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=outer)
+        found = flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=outer)
+        if found.rim_lost > LOST:
+            raise MeshError(
+                f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
+                "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
+            )
+        return found
 
     @property
     def mesh(self) -> TriangleMesh:

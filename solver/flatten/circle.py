@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..surface.mesh import Complexes, Floats, Integers, MeshError, TriangleMesh
-
-LOST = 0.35
-"""Share of the rim in arcs of the smallest size from which on a map is refused: bands of 1:12 have 0.32 and are still
-aligned right, of 1:14 0.41 and are not."""
+from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
 
 
 def smallest_arc(count: int) -> float:
@@ -48,21 +44,3 @@ def lost_rim(mesh: TriangleMesh, disc: Complexes, boundary: Integers) -> float:
     arcs = np.abs(disc[ahead] - disc[boundary])
     length = np.sqrt(((mesh.vertices[ahead] - mesh.vertices[boundary]) ** 2).sum(axis=1))
     return float(length[arcs <= 2 * smallest_arc(len(boundary))].sum() / length.sum())
-
-
-def require_rim(mesh: TriangleMesh, disc: Complexes, boundary: Integers) -> float:
-    """Return `lost_rim`; raise `MeshError` if that is too much."""
-    lost = lost_rim(mesh, disc, boundary)
-    if lost > LOST:
-        wide = (length := _rim_length(mesh, boundary)) ** 2 / (4 * mesh.area)
-        raise MeshError(
-            f"'{mesh.name}' is too long and narrow for a disc, about 1:{wide:.0f} (its rim of {length:.3g} around an "
-            f"area of {mesh.area:.3g}): {100 * lost:.0f} % of the rim would fall together in points; cut it into "
-            "pieces that are at most ten times as long as wide"
-        )
-    return lost
-
-
-def _rim_length(mesh: TriangleMesh, boundary: Integers) -> float:
-    steps = mesh.vertices[np.roll(boundary, -1)] - mesh.vertices[boundary]
-    return float(np.linalg.norm(steps, axis=1).sum())

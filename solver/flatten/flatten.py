@@ -13,7 +13,7 @@ from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
-from .circle import on_circle, require_rim
+from .circle import lost_rim, on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
@@ -101,7 +101,7 @@ def flatten(
         disc = METHODS[method](surface, boundary)
     except ValueError as reason:
         raise MeshError(f"'{mesh.name}' is too coarse for the method '{method}': {reason}") from reason
-    lost = require_rim(mesh, disc, boundary)
+    lost = lost_rim(mesh, disc, boundary)
     disc = _centred(disc, mesh)
     disc[boundary] = on_circle(disc[boundary])
 
