@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..solver import (
     Alignment,
     AlignSettings,
@@ -23,7 +25,8 @@ from ..solver import (
     topology,
 )
 from ..solver.align.prepared import cleaning_notes, flattening_notes
-from ..solver.surface.mesh import Booleans, Floats, Integers
+from ..solver.flatten.distortion import signed_areas
+from ..solver.surface.mesh import Booleans, Floats, Integers, plural
 from .kept_surfaces import surface_of
 from .mesh_data import Refusal
 
@@ -97,7 +100,16 @@ def flattened(
     tidy = in_order(mesh, repair, keys)
     vertex = None if outer is None else tidy.vertex_for(outer)
     found = flatten(tidy.mesh, method, fill_holes=repair.fill_holes, outer_vertex=vertex)
-    return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found)))
+    return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found), *_layout_notes(found)))
+
+
+def _layout_notes(found: Flattening) -> tuple[str, ...]:
+    """Say how many triangles have no area in the single precision of a UV map."""
+    stored = np.stack([found.disc.real, found.disc.imag], axis=1).astype(np.float32) / 2 + np.float32(0.5)
+    lost = int((signed_areas(stored[:, 0] + 1j * stored[:, 1].astype(np.float64), found.mesh.faces) <= 0).sum())
+    if not lost:
+        return ()
+    return (f"'{found.mesh.name}': {plural(lost, 'triangle')} too small in the disc for the precision of a UV map",)
 
 
 def aligned(
