@@ -14,7 +14,6 @@ import addon_utils
 
 from ..attributes import KINDS
 from . import blend, gifti, off, vtk
-from .joining import join_along_seams, join_coinciding
 from .unreadable import Unreadable
 
 
@@ -29,14 +28,11 @@ class Format:
         that the file has; otherwise they are those that are new.
     keeps : frozenset of str
         The kinds of `attributes.KINDS` that such a file can hold.
-    join : callable
-        Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
 
     importer: Callable[[str], object]
     exporter: Callable[[str], object]
     keeps: frozenset[str]
-    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
@@ -74,7 +70,6 @@ _PLY = Format(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors="SRGB"
     ),
     frozenset({"colors", "uv", "attributes"}),
-    join_along_seams,
 )
 _STL = Format(
     lambda path: bpy.ops.wm.stl_import(filepath=path),
@@ -85,7 +80,6 @@ _GLTF = Format(
     lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path),
     _save_gltf,
     frozenset({"colors", "uv"}),
-    join_coinciding,
 )
 _FBX = Format(
     lambda path: _operator("import_scene.fbx", "io_scene_fbx")(filepath=path),
@@ -119,11 +113,10 @@ class ReadOnly:
     """A kind of file that is read and not written; see `Format`."""
 
     importer: Callable[[str], object]
-    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 READ_ONLY = {
-    ".vrm": ReadOnly(_GLTF.importer, _GLTF.join),  # a .glb with an avatar's rig described in it
+    ".vrm": ReadOnly(_GLTF.importer),  # a .glb with an avatar's rig described in it
     ".usdz": ReadOnly(_USD.importer),
     ".off": ReadOnly(off.read),
     ".vtk": ReadOnly(vtk.read),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -40,19 +40,14 @@ class Imported:
         The object's name there; the scene's other objects may force another on it.
     obj : bpy.types.Object
         The object.
-    joined : int
-        Vertices that were joined with others at the very same place.
     """
 
     path: Path
     name: str
     obj: bpy.types.Object
-    joined: int = 0
 
     def order_change(self) -> str | None:
         """Return why the object's vertices are not numbered as in the file, or None if they are."""
-        if self.joined:
-            return f"{self.joined:,} that repeat another one's place were joined with it"
         if self.path.suffix.lower() == ".obj":
             with self.path.open("rb") as lines:
                 dropped = sum(line.startswith(b"v ") for line in lines) - len(self.obj.data.vertices)
@@ -87,7 +82,6 @@ def import_meshes(path: Path) -> list[Imported]:
     require_sound(path)
     with reading(path):
         meshes = _scans(_import(path, form.importer))
-        meshes = [replace(x, joined=form.join(x.obj.data)) for x in meshes]
     if not any(len(x.obj.data.vertices) for x in meshes):
         raise Unreadable(f"'{path}' holds no mesh{_what_is_missing()}")
     return meshes
