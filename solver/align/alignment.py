@@ -14,8 +14,8 @@ from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult
 from ..search.matching import Objective
 from ..search.rival import Rival
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.tidy import Cleaned
 from .confidence import evidence, probability
 from .objective import usual_difference
 from .overlap import Piece

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..flatten.flatten import Flattening
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Complexes, Floats, Integers, plural
+from ..surface.tidy import Cleaned
 
 REACH = 0.1
 """Pseudo-hyperbolic radius within which a landmark counts as hit: twice what Möbius maps of scans err by, 0.03 roots of

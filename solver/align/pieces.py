@@ -12,8 +12,8 @@ from ..mobius import hyperbolic_distance
 from ..search.fit import algebraic_fit
 from ..search.rival import ELSEWHERE
 from ..stages import Part
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Booleans, Floats, Integers, MeshError
+from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
 from .mobius_map import roughly_aligned
 from .overlap import Piece, shared

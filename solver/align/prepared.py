@@ -12,12 +12,13 @@ import numpy as np
 
 from ..flatten.flatten import Flattening, flatten
 from ..stages import Progress, Stages
-from ..surface.cleaning import Cleaned, cleaned
+from ..surface.cleaning import cleaned
 from ..surface.descriptors import diffused_curvatures
 from ..surface.fairing import faired
 from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
+from ..surface.tidy import Cleaned
 from ..surface.verdict import closing
 from .objective import interior, source_points
 from .settings import AlignSettings

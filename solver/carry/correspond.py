@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 
 from ..align.alignment import Alignment
 from ..flatten.flatten import Flattening
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.tidy import Cleaned
 
 
 @dataclass(frozen=True, eq=False)

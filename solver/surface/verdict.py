@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cleaning import Cleaned, cleaned
+from .cleaning import cleaned
 from .mesh import Floats, Integers, TriangleMesh, plural
+from .tidy import Cleaned
 from .topology import Topology, require_disc
 
 
