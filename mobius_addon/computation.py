@@ -8,21 +8,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..solver import (
     Alignment,
     AlignSettings,
+    Cleaned,
     Correspondence,
     Flattening,
     Progress,
     TriangleMesh,
     align,
+    cleaned,
     correspond,
     flatten,
     topology,
 )
-from ..solver.align.prepared import cleaning_notes, opening_notes
-from ..solver.surface.cleaning import in_order
-from ..solver.surface.mesh import Booleans, Integers
+from ..solver.align.prepared import cleaning_notes, flattening_notes
+from ..solver.flatten.distortion import signed_areas
+from ..solver.surface.mesh import Booleans, Floats, Integers, plural
 from .kept_surfaces import surface_of
 from .mesh_data import Refusal
 
@@ -34,16 +38,40 @@ class Repair:
     Attributes
     ----------
     fill_holes : bool
-        Close all boundary loops but the outer one for the computation.
+        Close all boundary loops but the outer one for the computation, and cut small handles.
     largest_part : bool
         Leave out all parts but the one of largest area.
     """
 
-    fill_holes: bool = False
-    largest_part: bool = False
+    fill_holes: bool = True
+    largest_part: bool = True
 
 
-def selected_loop(mesh: TriangleMesh, selected: Booleans, repair: Repair) -> int:
+@dataclass(frozen=True, eq=False)
+class Flat:
+    """A mesh flattened in order.
+
+    Attributes
+    ----------
+    flattening : Flattening
+        Of the mesh in order.
+    tidy : Cleaned
+        That, and how it relates to the mesh as it came.
+    notes : tuple of str
+        What was done to it, each a sentence.
+    """
+
+    flattening: Flattening
+    tidy: Cleaned
+    notes: tuple[str, ...]
+
+
+def in_order(mesh: TriangleMesh, repair: Repair, keys: Floats | None = None) -> Cleaned:
+    """Return a mesh put in order; see `solver.cleaned`."""
+    return cleaned(mesh, largest_part=repair.largest_part, fill_holes=repair.fill_holes, keys=keys)
+
+
+def selected_loop(mesh: TriangleMesh, selected: Booleans, repair: Repair, keys: Floats | None = None) -> int:
     """Return a vertex of the boundary loop that has selected vertices; `selected` is (n,).
 
     Raises
@@ -53,9 +81,9 @@ def selected_loop(mesh: TriangleMesh, selected: Booleans, repair: Repair) -> int
     MeshError
         As `in_order`.
     """
-    loops = [
-        loop[selected[loop]] for loop in topology(in_order(mesh, largest_part=repair.largest_part).mesh).boundary_loops
-    ]
+    tidy = in_order(mesh, repair, keys)
+    rims = [tidy.origin[loop] for loop in topology(tidy.mesh).boundary_loops]
+    loops = [loop[selected[loop]] for loop in rims]
     chosen = [loop for loop in loops if len(loop)]
     if len(chosen) != 1:
         state = f"on {len(chosen)} boundary loops" if chosen else "on no boundary loop"
@@ -66,12 +94,22 @@ def selected_loop(mesh: TriangleMesh, selected: Booleans, repair: Repair) -> int
 
 
 def flattened(
-    mesh: TriangleMesh, method: str, repair: Repair, *, outer: int | None = None
-) -> tuple[Flattening, tuple[str, ...]]:
-    """Return the flattening of a mesh put in order, and what was done to it, each a sentence; see `solver.flatten`."""
-    tidy = in_order(mesh, largest_part=repair.largest_part)
-    found = flatten(tidy.mesh, method, fill_holes=repair.fill_holes, outer_vertex=outer)
-    return found, (*cleaning_notes(tidy), *opening_notes(found))
+    mesh: TriangleMesh, method: str, repair: Repair, *, outer: int | None = None, keys: Floats | None = None
+) -> Flat:
+    """Return the flattening of a mesh put in order; see `solver.flatten`."""
+    tidy = in_order(mesh, repair, keys)
+    vertex = None if outer is None else tidy.vertex_for(outer)
+    found = flatten(tidy.mesh, method, fill_holes=repair.fill_holes, outer_vertex=vertex)
+    return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found), *_layout_notes(found)))
+
+
+def _layout_notes(found: Flattening) -> tuple[str, ...]:
+    """Say how many triangles have no area in the single precision of a UV map."""
+    stored = np.stack([found.disc.real, found.disc.imag], axis=1).astype(np.float32) / 2 + np.float32(0.5)
+    lost = int((signed_areas(stored[:, 0] + 1j * stored[:, 1].astype(np.float64), found.mesh.faces) <= 0).sum())
+    if not lost:
+        return ()
+    return (f"'{found.mesh.name}': {plural(lost, 'triangle')} too small in the disc for the precision of a UV map",)
 
 
 def aligned(
@@ -79,17 +117,19 @@ def aligned(
     target: TriangleMesh,
     settings: AlignSettings,
     *,
-    largest_part: bool = False,
+    largest_part: bool = True,
+    keys: tuple[Floats | None, Floats | None] = (None, None),
     landmarks: Integers | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> tuple[Alignment, Correspondence]:
     """Return the alignment of two meshes put in order, and their correspondence in the triangles they came with.
 
-    What was done to the meshes comes first among the alignment's warnings. See `solver.align`.
+    What was done to the meshes comes first among the alignment's warnings. `keys` are what shape keys say of which
+    vertices belong together. See `solver.align`.
     """
     source_surface, target_surface = (
-        surface_of(mesh, fill_holes=settings.fill_holes, largest_part=largest_part, outer_vertex=outer)
-        for mesh, outer in ((source, settings.source_outer), (target, settings.target_outer))
+        surface_of(mesh, fill_holes=settings.fill_holes, largest_part=largest_part, outer_vertex=outer, keys=own)
+        for mesh, outer, own in ((source, settings.source_outer, keys[0]), (target, settings.target_outer, keys[1]))
     )
     alignment = align(source_surface, target_surface, settings, progress, landmarks=landmarks)
     return alignment, correspond(alignment)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..solver import Surface, TriangleMesh
+from ..solver.surface.mesh import Floats
 
 KEPT = 4
 """Surfaces whose flattening, curvature and points are kept: those of the last pair, and of the one before."""
@@ -11,12 +12,20 @@ KEPT = 4
 _kept: dict[tuple[object, ...], Surface] = {}
 
 
-def surface_of(mesh: TriangleMesh, *, fill_holes: bool, largest_part: bool, outer_vertex: int | None) -> Surface:
+def surface_of(
+    mesh: TriangleMesh,
+    *,
+    fill_holes: bool,
+    largest_part: bool,
+    outer_vertex: int | None,
+    keys: Floats | None = None,
+) -> Surface:
     """Return the surface that a mesh is, as it was prepared before if name, positions and faces are the same."""
-    key = mesh.fingerprint, mesh.name, fill_holes, largest_part, outer_vertex
+    moved = None if keys is None else keys.tobytes()
+    key = mesh.fingerprint, mesh.name, fill_holes, largest_part, outer_vertex, moved
     surface = _kept.pop(key, None)
     if surface is None:
-        surface = Surface(mesh, fill_holes=fill_holes, largest_part=largest_part, outer_vertex=outer_vertex)
+        surface = Surface(mesh, fill_holes=fill_holes, largest_part=largest_part, outer_vertex=outer_vertex, keys=keys)
     _kept[key] = surface  # the one used last comes last
     while len(_kept) > KEPT:
         del _kept[next(iter(_kept))]

@@ -37,6 +37,8 @@ class Surface:
         Polygon of each face corner.
     edges : (e, 2) int
         Vertices of each of Blender's edges.
+    keys : (n, 6) float64 or None
+        Two mixtures of all shape keys: vertices that a key moves apart differ here. None without shape keys.
     """
 
     mesh: TriangleMesh
@@ -45,6 +47,7 @@ class Surface:
     corner_vertex: Integers
     corner_polygon: Integers
     edges: Integers
+    keys: Floats | None = None
 
 
 def foreach(collection: Any, name: str, width: int, dtype: type[np.generic]) -> np.ndarray:
@@ -83,7 +86,9 @@ def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
     if (shapes[1] != shapes[0]).any():
         seen = TriangleMesh(shapes[1], seen.faces, seen.name)
     edges = foreach(mesh.edges, "vertices", 2, np.int32).astype(np.intp)
-    return Surface(seen, rest, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon, edges)
+    return Surface(
+        seen, rest, corners.astype(np.intp), corner_vertex.astype(np.intp), corner_polygon, edges, _mixed_keys(mesh)
+    )
 
 
 def rest_positions(mesh: bpy.types.Mesh) -> Floats:
@@ -108,6 +113,19 @@ def seen_positions(obj: bpy.types.Object) -> Floats:
         weight = [sum(x.weight for x in vertex.groups if x.group == group.index) for vertex in obj.data.vertices]
         pinned = places + np.array(weight)[:, None] * (pinned - places)
     return pinned
+
+
+def _mixed_keys(mesh: bpy.types.Mesh) -> Floats | None:
+    """Return two mixtures of the displacements of all shape keys, (n, 6), None without any."""
+    blocks = mesh.shape_keys.key_blocks if mesh.shape_keys else ()
+    if len(blocks) < 2:
+        return None
+    rest = foreach(mesh.shape_keys.reference_key.data, "co", 3, np.float32).astype(np.float64)
+    mixed = np.zeros((2, *rest.shape))
+    shares = np.random.default_rng(0).uniform(0.5, 1.5, (len(blocks), 2, 1, 1))
+    for share, block in zip(shares, blocks, strict=True):
+        mixed += share * (foreach(block.data, "co", 3, np.float32) - rest)
+    return np.concatenate([*mixed], axis=1)
 
 
 def is_mirrored(obj: bpy.types.Object) -> bool:

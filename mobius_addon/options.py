@@ -7,10 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..solver import AlignSettings, TriangleMesh
+from ..solver import AlignSettings
 from .attributes import KINDS, Mask, TransferSettings, mask_names, split_names
 from .computation import Repair, selected_loop
-from .mesh_data import foreach
+from .mesh_data import Surface, foreach
 
 _DEFAULTS = AlignSettings()
 
@@ -20,7 +20,7 @@ class ScanOptions:
 
     fill_holes: bpy.props.BoolProperty(
         name="Fill Holes",
-        description="Accept a mesh with openings, such as a mouth: all but the outer one are closed for the "
+        description="Close openings, such as a mouth, all but the outer one, and cut small handles, for the "
         "computation. The mesh itself stays as it is",
         default=True,
     )
@@ -36,7 +36,7 @@ class ScanOptions:
     largest_part: bpy.props.BoolProperty(
         name="Largest Part",
         description="Leave all separate parts but the one of largest area out of the computation",
-        default=False,
+        default=True,
     )
 
 
@@ -48,7 +48,7 @@ def repair(options: Any) -> Repair:
     return Repair(options.fill_holes, options.largest_part)
 
 
-def outer_vertex(obj: bpy.types.Object, mesh: TriangleMesh, options: Any) -> int | None:
+def outer_vertex(obj: bpy.types.Object, surface: Surface, options: Any) -> int | None:
     """Return a vertex of the boundary loop that is chosen as the outer one, None for the longest.
 
     Raises
@@ -58,7 +58,8 @@ def outer_vertex(obj: bpy.types.Object, mesh: TriangleMesh, options: Any) -> int
     """
     if not options.fill_holes or options.outer_loop == "longest":
         return None
-    return selected_loop(mesh, foreach(obj.data.vertices, "select", 1, np.bool_), repair(options))
+    selected = foreach(obj.data.vertices, "select", 1, np.bool_)
+    return selected_loop(surface.mesh, selected, repair(options), surface.keys)
 
 
 class AlignOptions:

@@ -53,9 +53,10 @@ def require_room(obj: bpy.types.Object, layouts: Sequence[str], colors: Sequence
 
 
 def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Surface) -> None:
-    """Write points of the unit disc, (n,), as a UV map, uv = (disc + 1) / 2, and make it the active one.
+    """Write points of the unit disc as a UV map, uv = (disc + 1) / 2, and make it the active one.
 
-    Faces that have no place in the disc, nan, are put into its corner (0, 0), outside the disc.
+    `disc`, (m, 3), is at the triangles' corners. Faces that have no place in the disc, nan, are put into its corner
+    (0, 0), outside the disc.
 
     Raises
     ------
@@ -65,9 +66,12 @@ def write_layout(obj: bpy.types.Object, name: str, disc: Complexes, surface: Sur
     require_room(obj, [name])
     note(obj)
     render = next((x.name for x in obj.data.uv_layers if x.active_render), None)
-    plane = np.stack([disc.real, disc.imag], axis=1) / 2 + 0.5
-    bare = np.bincount(surface.corner_polygon, np.isnan(disc.real)[surface.corner_vertex]) > 0
-    values = np.where(bare[surface.corner_polygon, None], 0.0, plane[surface.corner_vertex])
+    at_corner = np.full(len(surface.corner_vertex), complex(np.nan, np.nan))
+    placed = np.isfinite(disc.real)
+    at_corner[surface.triangle_corners[placed]] = disc[placed]
+    plane = np.stack([at_corner.real, at_corner.imag], axis=1) / 2 + 0.5
+    bare = np.bincount(surface.corner_polygon, np.isnan(at_corner.real)) > 0
+    values = np.where(bare[surface.corner_polygon, None], 0.0, plane)
     _LAYOUT.write(obj, name, values, np.ones(len(values), bool))
     layers = obj.data.uv_layers
     layers.active = layers[name]

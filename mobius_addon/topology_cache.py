@@ -8,11 +8,10 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
-from ..solver import MeshError, Topology, TriangleMesh, topology
-from ..solver.surface.cleaning import in_order
+from ..solver import MeshError, Topology, topology
 from . import edits
-from .computation import Repair
-from .mesh_data import read_surface
+from .computation import Repair, in_order
+from .mesh_data import Surface, read_surface
 
 MAX_POLYGONS = 200_000
 """Larger meshes are checked when asked only, so that drawing the panel never takes noticeable time."""
@@ -49,20 +48,22 @@ def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
             count = iface_("{:,} vertices").format(len(obj.data.vertices))
             return Line((count, iface_("not checked yet")), None, True)
         try:
-            store(obj, read_surface(obj).mesh, repair)
+            store(obj, read_surface(obj), repair)
         except MeshError as error:
             _lines[key] = Line(_rows(str(error).removeprefix(f"'{obj.name}' ")), False)
     return _lines[key]
 
 
-def store(obj: bpy.types.Object, mesh: TriangleMesh, repair: Repair) -> None:
+def store(obj: bpy.types.Object, surface: Surface, repair: Repair) -> None:
     """Find out and keep what an object's mesh is."""
-    _lines[_key(obj, repair)] = _line(mesh, repair)
+    _lines[_key(obj, repair)] = _line(surface, repair)
 
 
-def _line(mesh: TriangleMesh, repair: Repair) -> Line:
+def _line(surface: Surface, repair: Repair) -> Line:
+    mesh, changes = surface.mesh, 0
     try:
-        mesh = in_order(mesh, largest_part=repair.largest_part).mesh
+        tidy = in_order(mesh, repair, surface.keys)
+        mesh, changes = tidy.mesh, len(tidy.changes)
     except MeshError as error:
         refused = _rows(str(error).removeprefix(f"'{mesh.name}' "))
     else:
@@ -72,10 +73,11 @@ def _line(mesh: TriangleMesh, repair: Repair) -> Line:
         return Line(problem, False, True)
     if refused:  # such as a band with one side only
         return Line(refused, False)
+    mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
     if openings := len(found.boundary_loops) - 1:
         loops = iface_("{:,} boundary loops:").format(openings + 1)
-        return Line((loops, iface_("{:,} will be filled").format(openings)), True, True)
-    return Line((iface_("disc, {:,} vertices").format(found.vertices),), True)
+        return Line((loops, iface_("{:,} will be filled").format(openings), *mended), True, True)
+    return Line((iface_("disc, {:,} vertices").format(found.vertices), *mended), True, bool(changes))
 
 
 def _problem(found: Topology, repair: Repair) -> tuple[str, str] | None:

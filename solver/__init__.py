@@ -11,7 +11,7 @@ from .flatten import Distortion, Flattening, flatten, silhouette_mesh
 from .mobius import Mobius
 from .search import SearchResult, search
 from .stages import Cancelled, Progress, SearchProgress
-from .surface import Cleaned, MeshError, Topology, TriangleMesh, cleaned, require_disc, topology
+from .surface import Cleaned, MeshError, Topology, TriangleMesh, Verdict, cleaned, require_disc, topology, verdict
 
 __all__ = [
     "AlignSettings",
@@ -29,6 +29,7 @@ __all__ = [
     "Surface",
     "Topology",
     "TriangleMesh",
+    "Verdict",
     "align",
     "cleaned",
     "correspond",
@@ -45,4 +46,5 @@ __all__ = [
     "search",
     "silhouette_mesh",
     "topology",
+    "verdict",
 ]

@@ -1,4 +1,4 @@
-"""`check`: what each mesh is, and what would make it a disc."""
+"""`check`: what each mesh is, and what will be done about it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 from ..streams import DONE, NOT_ALIGNED, UNUSABLE, say, say_error
 from .mesh_options import MESH_HELP
 
-HELP = "Say what each mesh is, and what would make it a disc."
+HELP = "Say what each mesh is, and what will be done about it."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
-    from ...solver import MeshError, topology
+    from ...solver import MeshError, verdict
     from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name
     from ..mesh_data import read_surface
 
@@ -35,15 +35,14 @@ def run(options: argparse.Namespace) -> int:
             name = argument if len(found) == 1 else f"{path}:{imported.name}"
             try:
                 require_places(imported)
-                what = topology(read_surface(imported.obj, name).mesh)
-                line, is_disc = what.describe(), what.is_disc
-            except MeshError as error:
-                line, is_disc = "not a disc: it " + str(error).removeprefix(f"'{name}' "), False
+                surface = read_surface(imported.obj, name)
+                line = verdict(surface.mesh, keys=surface.keys).describe()
             except Unreadable as error:
                 say_error(f"mobius: {error}")
                 status = UNUSABLE
                 continue
-            say(f"{name}: {line}")
-            if not is_disc:
+            except MeshError as error:
+                line = "cannot be used: it " + str(error).removeprefix(f"'{name}' ")
                 status = max(status, NOT_ALIGNED)
+            say(f"{name}: {line}")
     return status

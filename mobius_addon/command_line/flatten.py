@@ -34,6 +34,8 @@ def run(options: argparse.Namespace) -> int:
     """Flatten a mesh, write it, and return the exit status."""
     from dataclasses import asdict
 
+    import numpy as np
+
     from ..attributes import DISC_LAYOUT
     from ..computation import Repair, flattened
     from ..files import opened, outputs, write_mesh
@@ -49,10 +51,12 @@ def run(options: argparse.Namespace) -> int:
         require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])
         require_outer(options.outer, options, "--outer", surface)
         repair = Repair(options.fill_holes, options.largest_part)
-        flattening, notes = flattened(surface.mesh, options.method, repair, outer=options.outer)
-        write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+        flat = flattened(surface.mesh, options.method, repair, outer=options.outer, keys=surface.keys)
+        flattening = flat.flattening
+        write_layout(obj, DISC_LAYOUT, flat.tidy.at_corners(flattening.disc, np.nan), surface)
         if shown:
-            write_color(obj, shown.attribute, *shown.color(flattening))
+            color, known = shown.color(flattening)
+            write_color(obj, shown.attribute, flat.tidy.at_vertices(color, 0), flat.tidy.at_vertices(known, False))
     found = flattening.distortion
     with outputs() as written:
         backup = is_input(options.output, [options.mesh])
@@ -64,10 +68,10 @@ def run(options: argparse.Namespace) -> int:
                 "distortion": asdict(found),
                 "flips_repaired": flattening.flips_repaired,
                 "holes": [len(loop) for loop in flattening.holes],
-                "warnings": list(notes),
+                "warnings": list(flat.notes),
             }
             write_report(written.path(options.report), figures)
-    warn([*notes, *lost])
+    warn([*flat.notes, *lost])
     say(
         f"{options.output}: UV map '{DISC_LAYOUT}', angles off by {found.mean_angle_error:.2f}° on average "
         f"(median {found.median_angle_error:.2f}°, 99 % {found.percentile_99_angle_error:.1f}°, "

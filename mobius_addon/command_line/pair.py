@@ -62,7 +62,12 @@ def align_pair(
     require_outer(settings.target_outer, options, "--target-outer", target)
     pairs = _landmarks(options, files, (source.mesh, target.mesh))
     alignment, correspondence = aligned(
-        source.mesh, target.mesh, settings, largest_part=options.largest_part, landmarks=pairs
+        source.mesh,
+        target.mesh,
+        settings,
+        largest_part=options.largest_part,
+        keys=(source.keys, target.keys),
+        landmarks=pairs,
     )
     for warning in alignment.warnings:
         say_error(f"mobius: warning: {warning}")

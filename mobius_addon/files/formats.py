@@ -15,7 +15,6 @@ import bpy  # isort: skip  (first: it makes Blender's own modules importable)
 import addon_utils
 
 from . import blend, gifti, off, vtk
-from .joining import join_along_seams, join_coinciding
 from .unreadable import Unreadable
 
 
@@ -28,13 +27,10 @@ class Format:
     importer, exporter : callable
         Read a path into the scene; write the selected objects to a path with a small ending. An importer may return
         the list of objects that the file has; otherwise they are those that are new.
-    join : callable
-        Mends an imported mesh that such a file holds cut open, and returns how many vertices were joined.
     """
 
     importer: Callable[[str], object]
     exporter: Callable[[str], object]
-    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 def _operator(name: str, module: str | None = None) -> Callable[..., Any]:
@@ -88,14 +84,14 @@ _PLY = Format(
     lambda path: bpy.ops.wm.ply_export(
         filepath=path, export_selected_objects=True, apply_modifiers=False, export_colors="SRGB"
     ),
-    join_along_seams,
 )
 _STL = Format(
     lambda path: bpy.ops.wm.stl_import(filepath=path),
     lambda path: bpy.ops.wm.stl_export(filepath=path, export_selected_objects=True, apply_modifiers=False),
 )
 _GLTF = Format(
-    lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path), _save_gltf, join_coinciding
+    lambda path: _operator("import_scene.gltf", "io_scene_gltf2")(filepath=path),
+    _save_gltf,
 )
 _FBX = Format(
     lambda path: _operator("import_scene.fbx", "io_scene_fbx")(filepath=path),
@@ -128,11 +124,10 @@ class ReadOnly:
     """A kind of file that is read and not written; see `Format`."""
 
     importer: Callable[[str], object]
-    join: Callable[[bpy.types.Mesh], int] = lambda _mesh: 0
 
 
 READ_ONLY = {
-    ".vrm": ReadOnly(_GLTF.importer, _GLTF.join),  # a .glb with an avatar's rig described in it
+    ".vrm": ReadOnly(_GLTF.importer),  # a .glb with an avatar's rig described in it
     ".off": ReadOnly(off.read),
     ".vtk": ReadOnly(vtk.read),
     ".gii": ReadOnly(gifti.read),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -40,19 +40,14 @@ class Imported:
         The object's name there; the scene's other objects may force another on it.
     obj : bpy.types.Object
         The object.
-    joined : int
-        Vertices that were joined with others at the very same place.
     """
 
     path: Path
     name: str
     obj: bpy.types.Object
-    joined: int = 0
 
     def order_change(self) -> str | None:
         """Return why the object's vertices are not numbered as in the file, or None if they are."""
-        if self.joined:
-            return f"{self.joined:,} that repeat another one's place were joined with it"
         if self.path.suffix.lower() == ".obj":
             with self.path.open("rb") as lines:
                 dropped = sum(line.startswith(b"v ") for line in lines) - len(self.obj.data.vertices)
@@ -85,8 +80,7 @@ def import_meshes(path: Path) -> list[Imported]:
     form = reader_of(path)
     require_readable(path)
     with reading(path):
-        meshes = scans(path, _import(path, form.importer))
-        return [replace(x, joined=form.join(x.obj.data)) for x in meshes]
+        return scans(path, _import(path, form.importer))
 
 
 def _import(path: Path, importer: Callable[[str], object]) -> list[Imported]:

@@ -137,7 +137,6 @@ def _read_again(path: Path, before: Contents) -> Contents:
     new_scene()
     try:
         with quiet():
-            # as it stands in the file, nothing joined
             format_of(path).importer(str(path))
     except (RuntimeError, OSError) as error:
         raise Refusal(f"'{path.name}' was not written whole: {first_message(error)}") from error

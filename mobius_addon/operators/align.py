@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.spatial import KDTree
 
 from ... import solver
-from ...solver.surface.mesh import Floats
+from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..computation import aligned
@@ -57,11 +57,13 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         if not self.properties.is_property_set("time_limit") and (kept := preferences(context)):
             limit = kept.time_limit
         meshes = surfaces[0].mesh, surfaces[1].mesh
-        outer = outer_vertex(source, meshes[0], self), outer_vertex(target, meshes[1], self)
+        outer = outer_vertex(source, surfaces[0], self), outer_vertex(target, surfaces[1], self)
         options = replace(align_settings(self, limit, outer), take_rival=self.take_rival)
         largest_part = self.largest_part
         pairs = landmarks.from_scene(source, target, meshes, self.landmarks)
-        self._asked = meshes[0].fingerprint, meshes[1].fingerprint, options, largest_part, pairs.tobytes()
+        keys = surfaces[0].keys, surfaces[1].keys
+        moved = tuple(None if own is None else own.tobytes() for own in keys)
+        self._asked = meshes[0].fingerprint, meshes[1].fingerprint, moved, options, largest_part, pairs.tobytes()
         found, repeated = _last.get(self._asked), self.options.is_repeat
 
         def work(report: Report) -> Aligned:
@@ -70,7 +72,8 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
             if repeated:  # the window would be frozen
                 text = rpt_("The result of '{}' is not known any more: call it again")
                 raise Refusal(text.format(rpt_(self.job_title)))
-            return Aligned(*aligned(*meshes, options, largest_part=largest_part, landmarks=pairs, progress=report))
+            asked_for = {"largest_part": largest_part, "keys": keys, "landmarks": pairs}
+            return Aligned(*aligned(*meshes, options, **asked_for, progress=report))
 
         return work
 
@@ -164,25 +167,34 @@ def write_alignment(
     surfaces: Any,
 ) -> None:
     """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
-    carried = alignment.mobius(alignment.source.disc)
-    results.write_layout(source, SHARED_LAYOUT, carried, surfaces[0])
-    results.write_layout(target, SHARED_LAYOUT, alignment.mobius(alignment.carried), surfaces[1])
+    carried, still = alignment.mobius(alignment.source.disc), alignment.mobius(alignment.carried)
+    here, there = (
+        tidy or solver.Cleaned.unchanged(surface.mesh)
+        for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)
+    )
+    results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
+    results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
+    carried = here.at_vertices(carried, np.nan)
     used = np.isfinite(carried)
     color = results.disc_color(np.where(used, carried, 0))
     results.write_color(source, SHARED_COLOR, color, used)
     results.write_color(target, SHARED_COLOR, solver.interpolate(correspondence, color), correspondence.face >= 0)
     matched = np.where(correspondence.matched, correspondence.confidence, 0.0)
     results.write_group(target, MATCHED_GROUP, matched)
-    results.write_group(source, MATCHED_GROUP, on_source(alignment, correspondence, matched))
+    group = on_source(surfaces[0].mesh, here.vertex_of >= 0, correspondence, matched)
+    results.write_group(source, MATCHED_GROUP, group)
 
 
-def on_source(alignment: solver.Alignment, correspondence: solver.Correspondence, values: Floats) -> Floats:
-    """Return values per target vertex, (n_target,), carried to source vertices: each takes the nearest that arrives."""
-    mesh = alignment.source.mesh
+def on_source(
+    mesh: solver.TriangleMesh, used: Booleans, correspondence: solver.Correspondence, values: Floats
+) -> Floats:
+    """Return values per target vertex, (n_target,), carried to source vertices: each takes the nearest that arrives.
+
+    `used`, (n_source,), says which source vertices the map is about; 0 at others.
+    """
     found = np.flatnonzero(correspondence.face >= 0)
     places = (correspondence.matrix() @ mesh.vertices)[found]
     on_vertices = np.zeros(len(mesh.vertices))
-    used = np.unique(mesh.faces)
     on_vertices[used] = values[found[KDTree(places).query(mesh.vertices[used])[1]]]
     return on_vertices
 

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ...solver import MeshError, Topology, TriangleMesh, topology
+from ...solver import MeshError, Topology, TriangleMesh, topology, verdict
 from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
@@ -55,16 +55,22 @@ class MOBIUS_OT_check(bpy.types.Operator):
             self.report({"ERROR"}, reason)
             return {"CANCELLED"}
         try:
-            mesh = read_surface(obj).mesh
+            surface = read_surface(obj)
         except MeshError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        mesh, asked = surface.mesh, repair(context.scene.mobius)
+        topology_cache.store(obj, surface, asked)
         found = topology(mesh)
-        topology_cache.store(obj, mesh, repair(context.scene.mobius))
-        line = f"'{obj.name}': {found.describe()}"
-        if found.is_disc:
-            self.report({"INFO"}, line)
-            return {"FINISHED"}
+        try:
+            whole = verdict(mesh, largest_part=asked.largest_part, fill_holes=asked.fill_holes, keys=surface.keys)
+        except MeshError as error:
+            line = f"'{obj.name}' cannot be used: it " + str(error).removeprefix(f"'{mesh.name}' ")
+        else:
+            line = f"'{obj.name}': {whole.describe()}"
+            if not whole.repairs:
+                self.report({"INFO"}, line)
+                return {"FINISHED"}
         trouble = troubled_vertices(mesh, found)
         if self.select and trouble.any() and obj.data.is_editable:
             hidden = select_vertices(obj.data, trouble)

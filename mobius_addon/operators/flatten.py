@@ -55,15 +55,17 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
         try:
             require_room(obj, [DISC_LAYOUT], [shown.attribute] if shown else [])
             surface = read_surface(obj)
-            outer = outer_vertex(obj, surface.mesh, self)
-            flattening, notes = flattened(surface.mesh, self.method, repair(self), outer=outer)
+            outer = outer_vertex(obj, surface, self)
+            flat = flattened(surface.mesh, self.method, repair(self), outer=outer, keys=surface.keys)
         except (Refusal, MeshError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        write_layout(obj, DISC_LAYOUT, flattening.disc, surface)
+        flattening = flat.flattening
+        write_layout(obj, DISC_LAYOUT, flat.tidy.at_corners(flattening.disc, np.nan), surface)
         if shown:
-            write_color(obj, shown.attribute, *shown.color(flattening))
-        for note in notes:
+            color, known = shown.color(flattening)
+            write_color(obj, shown.attribute, flat.tidy.at_vertices(color, 0), flat.tidy.at_vertices(known, False))
+        for note in flat.notes:
             self.report({"WARNING"}, note)
         found = flattening.distortion
         flips = f", {found.flips} triangles turned over" if found.flips else ""

@@ -14,8 +14,8 @@ from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult
 from ..search.matching import Objective
 from ..search.rival import Rival
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.tidy import Cleaned
 from .confidence import evidence, probability
 from .objective import usual_difference
 from .overlap import Piece
@@ -33,8 +33,9 @@ class Alignment:
     search : SearchResult
         The certified search that found it; `mobius` may be refined beyond `search.mobius`.
     source, target : Flattening
-    source_cleaned : Cleaned or None
-        How the source's triangles were put in order for the computation; None if they were taken as they are.
+    source_cleaned, target_cleaned : Cleaned or None
+        How they were put in order for the computation, and how vertices and triangles relate to those of the meshes as
+        they came; None if these were taken as they are. All else here is about vertices of the meshes in order.
     source_samples, target_samples : (N1,), (N2,) int
         Vertices that stood for the surfaces in the search; `matches` index into these.
     source_descriptors, target_descriptors : (n, d) float64
@@ -80,6 +81,7 @@ class Alignment:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     source_cleaned: Cleaned | None = None
+    target_cleaned: Cleaned | None = None
 
     @property
     def margin(self) -> float | None:

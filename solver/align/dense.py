@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from ..bend.bend import ROUNDS, Draft, drafted, finished
 from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
 from ..stages import Part
-from ..surface.mesh import Booleans
+from ..surface.mesh import Booleans, Integers
 from .agreement import trust
 from .alignment import Alignment
 from .overlap import piece, shared
@@ -47,7 +46,7 @@ def bent_densely(
     found: Alignment,
     first: tuple[Draft, Booleans, Booleans],
     clock: Part,
-    landmarks: npt.ArrayLike | None,
+    landmarks: Integers | None,
 ) -> Alignment:
     """Bend the target onto the source from a first draft; where they show different pieces, what they share."""
     source, target = found.source, found.target

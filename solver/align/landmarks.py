@@ -7,37 +7,45 @@ import numpy.typing as npt
 
 from ..flatten.flatten import Flattening
 from ..surface.mesh import Complexes, Floats, Integers, plural
+from ..surface.tidy import Cleaned
 
 REACH = 0.1
 """Pseudo-hyperbolic radius within which a landmark counts as hit: twice what Möbius maps of scans err by, 0.03 roots of
 the area or 0.05 in the middle of the disc."""
 
 
-def usable_landmarks(pairs: npt.ArrayLike, source: Flattening, target: Flattening) -> tuple[Integers, list[str]]:
-    """Return the (source vertex, target vertex) rows that can be used, (l, 2), and warnings about the others.
+def own_landmarks(pairs: npt.ArrayLike | None, source: Cleaned, target: Cleaned) -> Integers | None:
+    """Return (source vertex, target vertex) rows, (l, 2), of the meshes as they came as vertices of those in order.
 
     Raises
     ------
     ValueError
         Not of shape (l, 2), not whole numbers, or no vertices of these meshes.
     """
+    if pairs is None or np.size(pairs) == 0:
+        return None
     given = np.asarray(pairs)
-    if given.size == 0:
-        return np.empty((0, 2), np.intp), []
     if given.ndim != 2 or given.shape[1] != 2 or not np.issubdtype(given.dtype, np.integer):
         raise ValueError(f"landmarks must be whole numbers of shape (l, 2), not {given.dtype} of shape {given.shape}")
-    for side, flattening in enumerate((source, target)):
-        column, count = given[:, side], len(flattening.disc)
-        if column.min() < 0 or column.max() >= count:
+    for column, tidy in zip(given.T, (source, target), strict=True):
+        if column.min() < 0 or column.max() >= tidy.size:
             raise ValueError(
-                f"landmarks name vertices outside 0 to {count - 1} of '{flattening.mesh.name}' (the first is row "
-                f"{int(np.argmax((column < 0) | (column >= count)))})"
+                f"landmarks name vertices outside 0 to {tidy.size - 1} of '{tidy.mesh.name}' (the first is row "
+                f"{int(np.argmax((column < 0) | (column >= tidy.size)))})"
             )
+    columns = [tidy.vertices_for(column) for column, tidy in zip(given.T, (source, target), strict=True)]
+    return np.stack(columns, axis=1).astype(np.intp)
+
+
+def usable_landmarks(given: Integers | None, source: Flattening, target: Flattening) -> tuple[Integers, list[str]]:
+    """Return the (source vertex, target vertex) rows that can be used, (l, 2), and warnings about the others."""
+    if given is None or given.size == 0:
+        return np.empty((0, 2), np.intp), []
     # nan compares false, so loose vertices drop out here too
     inside = (np.abs(source.disc[given[:, 0]]) < 1 - 1e-9) & (np.abs(target.disc[given[:, 1]]) < 1 - 1e-9)
     left_out = int((~inside).sum())
     warnings = [f"{plural(left_out, 'landmark')} on a boundary or in no face left out"] if left_out else []
-    return given[inside].astype(np.intp), warnings
+    return given[inside], warnings
 
 
 def with_landmarks(

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult, search
 from ..search.matching import Objective
 from ..search.rival import Rival, best_rival
 from ..stages import Cancelled, Part
+from ..surface.mesh import Integers
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility, covering_radius
@@ -26,7 +26,7 @@ def roughly_aligned(
     target_surface: Surface,
     settings: AlignSettings,
     clock: Part,
-    landmarks: npt.ArrayLike | None,
+    landmarks: Integers | None,
 ) -> Alignment:
     """Flatten, search, and refine the transformation; of prepared surfaces the rest is there already."""
     clock.begin("flatten source", "Flattening the source", 0.0)
@@ -47,7 +47,7 @@ def roughly_aligned(
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
     )
-    pairs, warnings = usable_landmarks(() if landmarks is None else landmarks, source, target)
+    pairs, warnings = usable_landmarks(landmarks, source, target)
     if len(pairs):
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
@@ -69,6 +69,7 @@ def roughly_aligned(
         settings=settings,
         other=other,
         source_cleaned=source_surface.cleaned,
+        target_cleaned=target_surface.cleaned,
     )
     clock.begin("rival", "Looking for a rival", 0.75)
     near = settings.reflect_margin * len(source_samples)

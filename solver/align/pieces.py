@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from ..bend.bend import Draft, drafted, finished
@@ -14,6 +13,7 @@ from ..search.fit import algebraic_fit
 from ..search.rival import ELSEWHERE
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, Integers, MeshError
+from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
 from .mobius_map import roughly_aligned
 from .overlap import Piece, shared
@@ -33,7 +33,7 @@ def overlap_of(
     source_part: Piece | None,
     target_part: Piece | None,
     clock: Part,
-    landmarks: npt.ArrayLike | None,
+    landmarks: Integers | None,
 ) -> Overlap | None:
     """Align the parts that the surfaces seem to share, by a draft of the whole; None if it was mistaken."""
     if source_part is None or target_part is None:
@@ -51,11 +51,16 @@ def overlap_of(
     )
     try:
         pairs = _within(landmarks, source_part, target_part)
-        surfaces = (
-            Surface(source_part.mesh, fill_holes=settings.fill_holes, outer_vertex=source_part.outer),
-            Surface(target_part.mesh, fill_holes=settings.fill_holes, outer_vertex=target_part.outer),
+        source, target = (
+            Surface(
+                part.mesh,
+                fill_holes=settings.fill_holes,
+                outer_vertex=part.outer,
+                tidy=Cleaned.unchanged(part.mesh),
+            )
+            for part in (source_part, target_part)
         )
-        inner = roughly_aligned(*surfaces, settings, clock.part(0.2, 0.5, "overlap"), pairs)
+        inner = roughly_aligned(source, target, settings, clock.part(0.2, 0.5, "overlap"), pairs)
     except MeshError:  # too small a piece to flatten
         return None
     if not _surely_better(inner.matched_weights, found.matched_weights):
@@ -90,11 +95,10 @@ def _surely_better(parts: Floats, whole: Floats) -> bool:
     return bool(parts.mean() - whole.mean() > SURE * error)
 
 
-def _within(landmarks: npt.ArrayLike | None, source: Piece, target: Piece) -> Integers | None:
+def _within(pairs: Integers | None, source: Piece, target: Piece) -> Integers | None:
     """Return the landmarks that lie in both pieces, as vertices of these."""
-    if landmarks is None or np.size(landmarks) == 0:
+    if pairs is None:
         return None
-    pairs = np.asarray(landmarks)
     rows = [np.searchsorted(part.vertices, column) for part, column in zip((source, target), pairs.T, strict=True)]
     inside = [
         part.vertices[np.minimum(row, len(part.vertices) - 1)] == column

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import numpy.typing as npt
 
 from ..stages import Progress, Stages
@@ -13,6 +12,8 @@ from ..surface.mesh import TriangleMesh
 from .alignment import Alignment
 from .confidence import BOUND
 from .dense import bent_densely, drafted_from
+from .inside_out import turned_round
+from .landmarks import own_landmarks
 from .mobius_map import roughly_aligned
 from .prepared import Surface
 from .reconsider import DOUBTFUL, reconsidered
@@ -58,12 +59,16 @@ def align(
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
     target = _surface(target_mesh, settings, settings.target_outer)
-    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), landmarks)
+    pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
+    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
     if settings.refine == "dense":
         part = clock.part(0.7, 0.95)
-        found = bent_densely(matched, drafted_from(matched, part), part, landmarks)
-        if not settings.take_rival and (landmarks is None or np.size(landmarks) == 0):  # these decide
-            found = reconsidered(found, matched, clock.part(0.95, 1))
+        found = bent_densely(matched, drafted_from(matched, part), part, pairs)
+        other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
+        if other is not None:
+            found, target = other
+        elif not settings.take_rival and pairs is None:  # these decide
+            found = reconsidered(found, matched, clock.part(0.97, 1))
     clock.end()
     found = replace(found, seconds=clock.seconds, warnings=(*source.notes, *target.notes, *found.warnings))
     if found.mean_confidence <= DOUBTFUL:
@@ -75,7 +80,7 @@ def align(
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:
     """Return a surface as it is, and a mesh as one."""
     if not isinstance(mesh, Surface):
-        return Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex)
-    if outer_vertex is not None and outer_vertex not in mesh.flattening.boundary:
+        return Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=True)
+    if outer_vertex is not None and mesh.cleaned.vertex_for(outer_vertex) not in mesh.flattening.boundary:
         raise ValueError(f"'{mesh.mesh.name}' was prepared with another outer boundary than that of {outer_vertex}")
     return mesh

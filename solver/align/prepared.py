@@ -12,13 +12,26 @@ import numpy as np
 
 from ..flatten.flatten import Flattening, flatten
 from ..stages import Progress, Stages
-from ..surface.cleaning import Cleaned, in_order
+from ..surface.cleaning import cleaned
 from ..surface.descriptors import diffused_curvatures
-from ..surface.mesh import Floats, Integers, TriangleMesh, plural
+from ..surface.fairing import faired
+from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
+from ..surface.tidy import Cleaned
+from ..surface.verdict import closing
 from .objective import interior, source_points
 from .settings import AlignSettings
+
+LITTLE = 0.02
+"""Share of the rim in the disc without its angles that is not worth a word."""
+
+LOST = 0.35
+"""Share of the rim in the disc without its angles from which on nothing is aligned: bands of 1:12 have 0.32 and are
+still aligned right, of 1:14 0.41 and are not."""
+
+FEWEST = 3
+"""Vertices inside the disc that a surface needs: a Möbius transformation has three parameters."""
 
 
 class Surface:
@@ -34,6 +47,10 @@ class Surface:
         A vertex on the outer boundary; None: the longest boundary is.
     largest_part : bool
         Whether all parts but the one of largest area are left out.
+    keys : (n, d) float64 or None
+        Further coordinates of the vertices; see `surface.cleaned`.
+    tidy : Cleaned or None
+        The mesh in order, if it is already.
     measured : (n, d) float64 or None
         The descriptors, once they are there.
     points : dict of str to dict of int to (k,) int
@@ -47,30 +64,42 @@ class Surface:
         fill_holes: bool = False,
         outer_vertex: int | None = None,
         largest_part: bool = False,
+        keys: Floats | None = None,
+        tidy: Cleaned | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
+        self.keys, self.tidy = keys, tidy
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
 
-    def known(self, cleaned: Cleaned, flattening: Flattening) -> None:
+    def known(self, flattening: Flattening) -> None:
         """Take from elsewhere what would be computed when it is first asked for."""
-        self.__dict__["cleaned"], self.__dict__["flattening"] = cleaned, flattening
+        self.__dict__["flattening"] = flattening
 
     @cached_property
     def cleaned(self) -> Cleaned:
         """The mesh, put in order for the computation; raises `MeshError`."""
-        return in_order(self.original, largest_part=self.largest_part)
+        if self.tidy is not None:
+            return self.tidy
+        return cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
 
     @cached_property
     def flattening(self) -> Flattening:
-        """Of the mesh in order; raises `MeshError`."""
-        return flatten(self.cleaned.mesh, fill_holes=self.fill_holes, outer_vertex=self.outer_vertex)
+        """Of the mesh in order, made fair where it is rough; raises `MeshError`, as for what is too long for a disc."""
+        outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
+        found = flatten(faired(self.cleaned.mesh), fill_holes=self.fill_holes, outer_vertex=outer)
+        if found.rim_lost > LOST:
+            raise MeshError(
+                f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
+                "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
+            )
+        return found
 
     @property
     def mesh(self) -> TriangleMesh:
-        """The mesh in order."""
-        return self.cleaned.mesh
+        """The mesh in order, made fair where it is rough: what everything is computed on."""
+        return self.flattening.mesh
 
     def descriptors(self, progress: Callable[[float], None] | None = None) -> Floats:
         """Return the standardised descriptors of all vertices, (n, d).
@@ -85,22 +114,35 @@ class Surface:
     def source_points(self, count: int) -> Integers:
         """Return up to `count` vertices that stand for it as a source."""
         if count not in self.points["source"]:
+            self._require_inside()
             self.points["source"][count] = source_points(self.flattening, self.descriptors(), count)
         return self.points["source"][count]
 
     def target_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
         """Return up to `count` vertices that stand for it as a target; `progress` as for `descriptors`."""
         if count not in self.points["target"]:
+            self._require_inside()
             nowhere = np.empty(0, np.intp)
             self.points["target"][count] = farthest_points(
                 self.mesh, count, nowhere, interior(self.flattening), progress
             )
         return self.points["target"][count]
 
+    def _require_inside(self) -> None:
+        """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
+        inside = int(interior(self.flattening).sum())
+        if inside < FEWEST:
+            raise MeshError(
+                f"'{self.mesh.name}' has {plural(inside, 'vertex')} inside its boundary, and {FEWEST} are the fewest "
+                "that tell how it lies: subdivide it"
+            )
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
-        return (*cleaning_notes(self.cleaned), *opening_notes(self.flattening))
+        rough = f"'{self.mesh.name}' is rough or noisy: smoothed, for the computation only"
+        smoothed = (rough,) if self.mesh is not self.cleaned.mesh else ()
+        return (*cleaning_notes(self.cleaned), *smoothed, *flattening_notes(self.flattening))
 
 
 def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
@@ -108,13 +150,14 @@ def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
     return (f"'{tidy.mesh.name}': {', '.join(tidy.changes)}, for the computation only",) if tidy.changes else ()
 
 
-def opening_notes(found: Flattening) -> tuple[str, ...]:
-    """Say which openings were closed for the computation."""
-    if not found.holes:
-        return ()
-    edges = ", ".join(f"{len(loop):,}" for loop in found.holes[:6]) + (", ..." if len(found.holes) > 6 else "")
-    number = plural(len(found.holes), "opening")
-    return (f"'{found.mesh.name}': {number} ({edges} edges) closed, for the computation only",)
+def flattening_notes(found: Flattening) -> tuple[str, ...]:
+    """Say which openings were closed for the computation, and where the disc is too narrow for the surface."""
+    lost = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
+    return (*_opening_notes(found), *((lost,) if found.rim_lost > LITTLE else ()))
+
+
+def _opening_notes(found: Flattening) -> tuple[str, ...]:
+    return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
 
 
 def prepare(
@@ -122,7 +165,8 @@ def prepare(
     settings: AlignSettings | None = None,
     *,
     outer_vertex: int | None = None,
-    largest_part: bool = False,
+    largest_part: bool = True,
+    keys: Floats | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -130,13 +174,15 @@ def prepare(
     Parameters
     ----------
     mesh : TriangleMesh
-        A triangulated disc; faces used twice or turned round are put in order.
+        A surface that `surface.cleaned` can make a disc.
     settings : AlignSettings, optional
         `fill_holes`, `samples` and `targets` count.
     outer_vertex : int, optional
         A vertex on the loop that is to be the outer one, for `fill_holes`; by default the longest loop is.
     largest_part : bool
         Leave out all parts but the one of largest area.
+    keys : (n, d) float64, optional
+        Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
     progress : callable, optional
         As for `align`.
 
@@ -151,7 +197,9 @@ def prepare(
     clock = Stages(progress)
     whole = clock.part(0, 1)
     whole.begin("flatten", "Flattening", 0.0)
-    surface = Surface(mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part)
+    surface = Surface(
+        mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part, keys=keys
+    )
     _ = surface.flattening
     whole.begin("descriptors", "Measuring curvature", 0.3)
     surface.descriptors(whole.within(0.3, 0.6))

@@ -38,7 +38,8 @@ class AlignSettings:
         "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
         the source, smoothly and without folds.
     fill_holes : bool
-        Allow meshes with openings: all boundary loops but the outer one are closed for the computation.
+        Allow meshes with openings and handles: all boundary loops but the outer one are closed for the computation, and
+        small handles cut and closed. Without it such a mesh is refused.
     source_outer, target_outer : int, optional
         A vertex on the loop that is to be the outer one; by default the longest loop is.
     """
@@ -53,7 +54,7 @@ class AlignSettings:
     take_rival: bool = False
     time_limit: float | None = 60.0
     refine: str = "dense"
-    fill_holes: bool = False
+    fill_holes: bool = True
     source_outer: int | None = None
     target_outer: int | None = None
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from ..flatten.flatten import Flattening
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import MeshError, TriangleMesh
 from .prepared import Surface
 
@@ -20,12 +19,12 @@ _KIND = "mobius surface 1"
 def save_surface(path: Path | str, surface: Surface) -> None:
     """Write a surface with all that has been computed of it, and its flattening in any case.
 
-    Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came; kept (k,) int,
-    reversed (k,) bool and changes, text, of the faces put in order; fill_holes, largest_part, outer_vertex (-1: none);
-    disc (n,) complex; boundary, holes one after another and hole_sizes; flips_repaired; descriptors (n, d); and
-    source_COUNT and target_COUNT, the points chosen for each count.
+    Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came, keys (n, d); fill_holes,
+    largest_part, outer_vertex (-1: none); computed (q, 3), the vertices as they are computed with; disc (q,) complex;
+    boundary, holes one after another and hole_sizes; flips_repaired, rim_lost; descriptors (q, d); and source_COUNT and
+    target_COUNT, the points chosen for each count. What is put in order is put in order again when the file is read.
     """
-    tidy, flat = surface.cleaned, surface.flattening
+    flat = surface.flattening
     chosen = {f"{role}_{count}": points for role, counts in surface.points.items() for count, points in counts.items()}
     with Path(path).open("wb") as file:
         np.savez_compressed(
@@ -35,17 +34,17 @@ def save_surface(path: Path | str, surface: Surface) -> None:
             name=surface.original.name,
             vertices=surface.original.vertices,
             faces=surface.original.faces,
-            kept=tidy.faces,
-            reversed=tidy.reversed,
-            changes=np.array(tidy.changes, dtype=str),
+            **({} if surface.keys is None else {"keys": surface.keys}),
             fill_holes=surface.fill_holes,
             largest_part=surface.largest_part,
             outer_vertex=-1 if surface.outer_vertex is None else surface.outer_vertex,
+            computed=flat.mesh.vertices,
             disc=flat.disc,
             boundary=flat.boundary,
             holes=np.concatenate([np.empty(0, np.intp), *flat.holes]),
             hole_sizes=np.array([len(loop) for loop in flat.holes], np.intp),
             flips_repaired=flat.flips_repaired,
+            rim_lost=flat.rim_lost,
             **({} if surface.measured is None else {"descriptors": surface.measured}),
             **chosen,
         )
@@ -75,24 +74,21 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     """Return the surface of a file's arrays; raises one of several errors where they do not fit."""
     original = TriangleMesh(stored["vertices"], stored["faces"], str(stored["name"]))
     _require(original.fingerprint == str(stored["fingerprint"]), "the mesh is not the one that was prepared")
-    size, count = len(original.vertices), len(original.faces)
+    keys = stored["keys"].astype(np.float64, casting="safe") if "keys" in stored else None
+    _require(keys is None or (keys.ndim == 2 and len(keys) == len(original.vertices)), "keys")
     outer = int(stored["outer_vertex"])
     surface = Surface(
         original,
         fill_holes=bool(stored["fill_holes"]),
         outer_vertex=None if outer < 0 else outer,
         largest_part=bool(stored["largest_part"]),
+        keys=keys,
     )
-    kept, turned = _indices(stored["kept"], count), stored["reversed"]
-    _require(turned.dtype == bool and turned.shape == kept.shape, "faces put in order")
-    changes = tuple(str(change) for change in stored["changes"])
-    mesh = original
-    if changes:
-        faces = original.faces[kept]
-        faces[turned] = faces[turned][:, [0, 2, 1]]
-        mesh = TriangleMesh(original.vertices, faces, original.name)
-    else:
-        _require(len(kept) == count and not turned.any(), "faces put in order")
+    mesh = surface.cleaned.mesh
+    size, computed = len(mesh.vertices), stored["computed"]
+    _require(computed.shape == mesh.vertices.shape, "the vertices as they are computed with")
+    if not np.array_equal(computed, mesh.vertices):
+        mesh = TriangleMesh(computed, mesh.faces, mesh.name)
     disc = stored["disc"].astype(np.complex128, casting="safe")
     _require(disc.shape == (size,) and (np.isfinite(disc) == mesh.used).all(), "the disc")
     _require(bool((np.abs(disc[mesh.used]) <= 1 + 1e-12).all()), "the disc")
@@ -105,8 +101,9 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
         _indices(stored["boundary"], size),
         tuple(np.split(holes, ends[:-1])) if len(ends) else (),
         int(stored["flips_repaired"]),
+        float(stored["rim_lost"]),
     )
-    surface.known(Cleaned(mesh, kept, turned, changes, original.faces), flat)
+    surface.known(flat)
     if "descriptors" in stored:
         surface.measured = stored["descriptors"].astype(np.float64, casting="safe")
         _require(len(surface.measured) == size and surface.measured.ndim == 2, "descriptors")

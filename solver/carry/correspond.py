@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 
 from ..align.alignment import Alignment
 from ..flatten.flatten import Flattening
-from ..surface.cleaning import Cleaned
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.tidy import Cleaned
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,25 +53,28 @@ def correspond(alignment: Alignment) -> Correspondence:
     """Carry every target vertex through the discs into the source.
 
     The vertex's place in the target's disc is taken back by the inverse transformation and located in the source's. One
-    that comes to lie in an opening of the source takes the nearest point of its rim, with a confidence of 0. Faces are
-    those of the source as it came, whatever was put in order for the computation.
+    that comes to lie in an opening of the source takes the nearest point of its rim, with a confidence of 0. Faces and
+    vertices are those of the meshes as they came, whatever was put in order for the computation.
     """
     source, target = alignment.source, alignment.target
     used = np.flatnonzero(np.isfinite(target.disc.real))
     face, barycentric = alignment.located
     confidence = alignment.confidence.copy()
     confidence[used[in_openings(source, alignment.carried[used], face[used], barycentric[used])]] = 0
-    triangles = source.mesh.faces
+    triangles, size = source.mesh.faces, len(source.disc)
     if (tidy := alignment.source_cleaned) is not None and tidy.changes:
-        triangles = tidy.original_faces
+        triangles, size = tidy.original_faces, tidy.size
         face, barycentric = _in_own_triangles(face, barycentric, tidy)
+    if (tidy := alignment.target_cleaned) is not None and tidy.changes:
+        face, barycentric = tidy.at_vertices(face, -1), tidy.at_vertices(barycentric, 0)
+        confidence = tidy.at_vertices(confidence, 0)
     return Correspondence(
         face=face,
         barycentric=barycentric,
         matched=confidence >= 0.5,
         confidence=confidence,
         source_triangles=triangles,
-        source_size=len(source.disc),
+        source_size=size,
     )
 
 

@@ -52,6 +52,13 @@ def save_map(
         The meshes that the correspondence counts, which `load_map` is to know again; those aligned by default.
     """
     meshes = source or alignment.source.mesh, target or alignment.target.mesh
+    source_disc, target_disc = (
+        flattening.disc if tidy is None else tidy.at_vertices(flattening.disc, np.nan)
+        for flattening, tidy in (
+            (alignment.source, alignment.source_cleaned),
+            (alignment.target, alignment.target_cleaned),
+        )
+    )
     with Path(path).open("wb") as file:
         np.savez_compressed(
             file,
@@ -63,8 +70,8 @@ def save_map(
             source_size=correspondence.source_size,
             source_fingerprint=meshes[0].fingerprint,
             target_fingerprint=meshes[1].fingerprint,
-            source_disc=alignment.source.disc,
-            target_disc=alignment.target.disc,
+            source_disc=source_disc,
+            target_disc=target_disc,
             z=alignment.mobius.z,
             theta=alignment.mobius.theta,
             reflected=alignment.mobius.reflected,

@@ -16,7 +16,9 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
     `coverage` is the share of the target's area whose vertices are matched. `value` to `rival` are about the whole
     discs, `overlap` about the parts that both surfaces show, where these are less; `rival_margin` is the latter's then.
     """
-    found, areas, parts = alignment.search, alignment.target.mesh.vertex_areas, alignment.overlap
+    found, parts = alignment.search, alignment.overlap
+    tidy = alignment.target_cleaned
+    areas = alignment.target.mesh.vertex_areas if tidy is None else tidy.area_at_vertices()
     decisive = alignment if parts is None else parts.alignment
     return {
         "source": alignment.source.mesh.name,

@@ -1,10 +1,10 @@
-"""Points in order on the unit circle."""
+"""Points in order on the unit circle, and how much of a rim numbers cannot tell apart there."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..surface.mesh import Complexes, Floats
+from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
 
 
 def smallest_arc(count: int) -> float:
@@ -33,3 +33,14 @@ def on_circle(points: Complexes) -> Complexes:
     if arcs.min() >= 0.5 * smallest_arc(len(arcs)):
         return points
     return points[0] * np.exp(1j * angles_of_arcs(np.maximum(arcs, 0)))
+
+
+def lost_rim(mesh: TriangleMesh, disc: Complexes, boundary: Integers) -> float:
+    """Return the share of the rim's length, in [0, 1], the arcs of which are no longer than numbers force them to be.
+
+    There the map is not conformal: the true arcs are shorter, as at the ends of a long band.
+    """
+    ahead = np.roll(boundary, -1)
+    arcs = np.abs(disc[ahead] - disc[boundary])
+    length = np.sqrt(((mesh.vertices[ahead] - mesh.vertices[boundary]) ** 2).sum(axis=1))
+    return float(length[arcs <= 2 * smallest_arc(len(boundary))].sum() / length.sum())

@@ -13,11 +13,11 @@ from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
-from .circle import on_circle
+from .circle import lost_rim, on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .harmonic import riemann_map
-from .injective import untangled
+from .injective import require_injective, untangled
 from .mid_edge import mid_edge_map
 
 METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map, "circle-packing": packed}
@@ -40,6 +40,8 @@ class Flattening:
         Boundary loops that were closed for the computation; nothing is mapped to what they enclose.
     flips_repaired : int
         Triangles that were turned over in the conformal map and put right by moving the vertices around them.
+    rim_lost : float
+        Share of the outer boundary's length, in [0, 1], where numbers cannot carry its angles: see `circle.lost_rim`.
     """
 
     mesh: TriangleMesh
@@ -47,6 +49,7 @@ class Flattening:
     boundary: Integers
     holes: tuple[Integers, ...] = ()
     flips_repaired: int = 0
+    rim_lost: float = 0.0
 
     @cached_property
     def distortion(self) -> Distortion:
@@ -85,7 +88,8 @@ def flatten(
     Raises
     ------
     MeshError
-        The mesh is no disc, `outer_vertex` is on none of its boundary loops, or the mesh is too coarse for the method.
+        The mesh is no disc, `outer_vertex` is on none of its boundary loops, the mesh is too coarse for the method, or
+        so deep or narrow somewhere that numbers cannot tell its triangles apart in the disc.
     ValueError
         An unknown method.
     """
@@ -97,15 +101,17 @@ def flatten(
         disc = METHODS[method](surface, boundary)
     except ValueError as reason:
         raise MeshError(f"'{mesh.name}' is too coarse for the method '{method}': {reason}") from reason
+    lost = lost_rim(mesh, disc, boundary)
     disc = _centred(disc, mesh)
     disc[boundary] = on_circle(disc[boundary])
 
     turned = _turned(disc, mesh)
     if turned:
         disc = untangled(surface.faces, surface.lengths, disc, boundary)
+    require_injective(mesh, disc[: len(mesh.vertices)])
     result = np.full(len(mesh.vertices), complex(np.nan, np.nan))
     result[mesh.used] = disc[: len(result)][mesh.used]
-    return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh))
+    return Flattening(mesh, result, boundary, holes, turned - _turned(disc, mesh), lost)
 
 
 def _centred(disc: Complexes, mesh: TriangleMesh) -> Complexes:

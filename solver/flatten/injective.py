@@ -1,13 +1,15 @@
-"""Repair of a planar map with triangles turned over: convex combinations of neighbours around them."""
+"""Repair of a planar map with triangles turned over: convex combinations of neighbours around them; and its proof."""
 
 from __future__ import annotations
+
+from fractions import Fraction
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
 from ..surface.cholesky import factorised
 from ..surface.laplacian import cotangents
-from ..surface.mesh import Booleans, Complexes, Floats, Integers, directed_edges
+from ..surface.mesh import Booleans, Complexes, Floats, Integers, MeshError, TriangleMesh, directed_edges, plural
 from .distortion import signed_areas
 
 
@@ -54,6 +56,45 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
         if not (signed_areas(trial, faces) <= 0).any():
             return trial
     return plane
+
+
+def require_injective(mesh: TriangleMesh, disc: Complexes) -> None:
+    """Raise `MeshError` if a map to the disc, (n,), turns a triangle over, collapses one or leaves the disc.
+
+    What rounding leaves open is decided in exact arithmetic.
+    """
+    places = disc[mesh.used]
+    if np.isfinite(places).all() and (np.abs(places) <= 1 + 1e-12).all():
+        count = int(collapsed(disc, mesh.faces).sum())
+        if not count:
+            return
+        what = f"{plural(count, 'triangle')} would be turned over or lost"
+    else:
+        what = "parts of it would leave the disc"
+    image = np.abs(signed_areas(np.nan_to_num(disc), mesh.faces))
+    around = np.bincount(mesh.faces.ravel(), np.repeat(image / 3, 3), len(mesh.vertices))
+    seen = (around > 0) & (mesh.vertex_areas > 0)
+    share = mesh.vertex_areas[seen] / mesh.area / (around[seen] / np.pi)
+    power = int(np.log10(share.max())) if seen.any() else 0
+    raise MeshError(
+        f"'{mesh.name}' is too deep or too long for a disc: {what}, as parts shrink to 1/10^{power} of their area "
+        "there: cut them off, or cut it into pieces that are about as wide as long"
+    )
+
+
+def collapsed(disc: Complexes, faces: Integers) -> Booleans:
+    """Return which triangles, (m,), are not counter-clockwise in the plane, in exact arithmetic."""
+    a, b, c = (disc[faces[:, k]] for k in range(3))
+    areas = signed_areas(disc, faces)
+    result = areas <= 0
+    # the error of the area is below that of its two products
+    bound = 4e-16 * np.abs(b - a) * np.abs(c - a)
+    for face in np.flatnonzero(np.abs(areas) <= bound).tolist():
+        (ax, ay), (bx, by), (cx, cy) = (
+            (Fraction(float(p.real)), Fraction(float(p.imag))) for p in (a[face], b[face], c[face])
+        )
+        result[face] = (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax)
+    return result
 
 
 def _combined(weights: csr_array, plane: Complexes, free: Integers) -> Complexes:

@@ -3,8 +3,20 @@
 The stages above ask here for everything that concerns one surface as it lies in space, before any map of it.
 """
 
-from .cleaning import Cleaned, cleaned
+from .cleaning import cleaned
 from .mesh import MeshError, TriangleMesh
+from .tidy import Cleaned
 from .topology import Topology, require_disc, topology
+from .verdict import Verdict, verdict
 
-__all__ = ["Cleaned", "MeshError", "Topology", "TriangleMesh", "cleaned", "require_disc", "topology"]
+__all__ = [
+    "Cleaned",
+    "MeshError",
+    "Topology",
+    "TriangleMesh",
+    "Verdict",
+    "cleaned",
+    "require_disc",
+    "topology",
+    "verdict",
+]

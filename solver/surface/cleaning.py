@@ -1,46 +1,36 @@
-"""Faces of a scan put in order: degenerate and duplicate ones left out, one orientation, one part."""
+"""A scan put in order for the computation."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from .mesh import Booleans, Integers, MeshError, TriangleMesh, directed_edges, edges_of_sides, plural
+from .gluing import Glue, glue_of, shape_of, sides_to_turn, turned_glue, vertices_of_glue
+from .handles import MOST, cut_handles
+from .joining import coinciding
+from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, edges_of_sides, plural, twin_sides
+from .numbers import computable
+from .sheets import drawn_together, inner_walls
+from .spikes import without_spikes
+from .tidy import Cleaned
 from .topology import topology
 
+TINY = 1e-9
+"""Length, in diagonals, up to which an edge has none."""
 
-@dataclass(frozen=True, eq=False)
-class Cleaned:
-    """A mesh in order and how its faces relate to those of the mesh it came from.
-
-    Attributes
-    ----------
-    mesh : TriangleMesh
-        On the same vertices; the original itself where there was nothing to do.
-    faces : (m,) int
-        The original face that each face was.
-    reversed : (m,) bool
-        Faces whose second and third corners changed places.
-    changes : tuple of str
-        What was done, each as the rest of a sentence about the mesh.
-    original_faces : (m_original, 3) int
-        The faces as they came.
-    """
-
-    mesh: TriangleMesh
-    faces: Integers
-    reversed: Booleans
-    changes: tuple[str, ...]
-    original_faces: Integers
+CUT_OPEN = 0.4
+"""Share of a closed surface's area from which on a part that was cut out of it along its edges is taken as it is."""
 
 
-def cleaned(mesh: TriangleMesh, *, largest_part: bool = False) -> Cleaned:
-    """Leave out degenerate and duplicate faces, turn faces to one side and, on request, keep the largest part alone.
+def cleaned(
+    mesh: TriangleMesh, *, largest_part: bool = False, fill_holes: bool = False, keys: Floats | None = None
+) -> Cleaned:
+    """Put a mesh in order for the computation: whatever can be told from the surface itself.
 
-    Vertices stay, in use or not, so that vertex indices keep their meaning.
+    It is moved and scaled where arithmetic needs that. Faces that use a vertex twice, duplicates, inner walls and edges
+    without length go. Boundary edges that coincide are joined; vertices in which parts touch are split; all faces face
+    one side. On request the largest part is kept alone, and handles are cut. Spikes are put back.
 
     Parameters
     ----------
@@ -48,11 +38,15 @@ def cleaned(mesh: TriangleMesh, *, largest_part: bool = False) -> Cleaned:
         Any mesh.
     largest_part : bool
         Keep the part of largest area, where faces that share an edge are connected.
+    fill_holes : bool
+        Openings will be closed, so that handles may be cut, which leaves two of each.
+    keys : (n, d) float64, optional
+        Further coordinates of the vertices, as by shape keys: what does not stay together there is not joined.
 
     Raises
     ------
     MeshError
-        No face is left, or the faces cannot agree about the outside (a Möbius strip).
+        There is no surface, the coordinates are too coarse, or the faces cannot agree about the outside.
 
     Examples
     --------
@@ -61,94 +55,192 @@ def cleaned(mesh: TriangleMesh, *, largest_part: bool = False) -> Cleaned:
     >>> result.mesh.faces.tolist(), result.changes
     ([[0, 1, 2], [0, 2, 3]], ('1 face with a vertex used twice left out', '1 face turned over'))
     """
-    changes: list[str] = []
-    degenerate = (mesh.faces == mesh.faces[:, [1, 2, 0]]).any(axis=1)
-    if n := int(degenerate.sum()):
-        changes.append(f"{plural(n, 'face')} with a vertex used twice left out")
-    kept = np.flatnonzero(~degenerate)
-    if not kept.size:
-        raise MeshError(f"'{mesh.name}' has only faces that use a vertex twice: the file is damaged")
-    _, first = np.unique(np.sort(mesh.faces[kept], axis=1), axis=0, return_index=True)
-    if n := len(kept) - len(first):
-        changes.append(f"{plural(n, 'duplicate face')} left out")
-    kept = kept[np.sort(first)]
-
+    work = _Work(mesh, largest_part)
+    if work.in_order_but_for_sides(keys):
+        return work.result()
+    work.leave_out_faces()
+    glue = work.glue_sides(keys)
     if largest_part:
-        part = _parts(mesh, kept)
-        area = np.bincount(part, mesh.face_areas[kept])
-        if len(area) > 1:
-            changes.append(f"{plural(len(area) - 1, 'smaller part')} left out")
-            kept = kept[part == np.argmax(area)]
-
-    turned = _to_turn(mesh, kept)
-    if n := int(turned.sum()):
-        changes.append(f"{plural(n, 'face')} turned over")
-    if not changes:
-        return Cleaned(mesh, kept, turned, (), mesh.faces)
-    faces = mesh.faces[kept]
-    faces[turned] = faces[turned][:, [0, 2, 1]]
-    return Cleaned(TriangleMesh(mesh.vertices, faces, mesh.name), kept, turned, tuple(changes), mesh.faces)
+        glue = work.keep_largest_part(glue)
+    glue = work.turn(glue)
+    work.name_vertices(glue)
+    if fill_holes:
+        work.cut_handles(glue)
+    return work.result()
 
 
-def in_order(mesh: TriangleMesh, *, largest_part: bool = False) -> Cleaned:
-    """Return `cleaned` of a mesh that needs it; of one in order, itself.
+class _Work:
+    """A mesh while it is put in order."""
 
-    Raises
-    ------
-    MeshError
-        It cannot be put in order.
-    """
-    found = topology(mesh)
-    untidy = len(found.degenerate_faces) or len(found.duplicate_faces) or len(found.inconsistent_edges)
-    if not untidy and (found.parts == 1 or not largest_part):
-        count = len(mesh.faces)
-        return Cleaned(mesh, np.arange(count), np.zeros(count, bool), (), mesh.faces)
-    try:
-        return cleaned(mesh, largest_part=largest_part)
-    except MeshError as error:
-        if n := len(found.non_manifold_edges):  # why no side can be told
+    def __init__(self, original: TriangleMesh, largest_part: bool) -> None:
+        self.original = original
+        degenerate = (original.faces == original.faces[:, [1, 2, 0]]).any(axis=1)
+        if degenerate.all():
+            raise MeshError(f"'{original.name}' has only faces that use a vertex twice: the file is damaged")
+        self.mesh, notes = computable(original)
+        self.changes = list(notes)
+        if n := int(degenerate.sum()):
+            self.changes.append(f"{plural(n, 'face')} with a vertex used twice left out")
+        self.largest_part = largest_part
+        # original faces, their vertices as they are now, and whether their second and third corners changed places
+        self.kept = np.flatnonzero(~degenerate)
+        self.faces = original.faces[self.kept]
+        self.turned = np.zeros(len(self.kept), bool)
+        self.origin = np.arange(len(original.vertices))
+        self.vertex_of = np.where(original.used, self.origin, -1)
+
+    def in_order_but_for_sides(self, keys: Floats | None) -> bool:
+        """Return whether nothing is to be done about faces and vertices; then the mesh's own glue is right."""
+        found = topology(self.mesh)
+        flaws = (found.degenerate_faces, found.duplicate_faces, found.non_manifold_edges, found.non_manifold_vertices)
+        several = found.parts > 1 and self.largest_part
+        if any(len(x) for x in (*flaws, found.inconsistent_edges)) or several or found.handles:
+            return False
+        glue = glue_of(self.mesh.faces, self.mesh.twins)
+        if (self.mesh.edge_lengths <= TINY * self.mesh.diagonal).any():
+            return False
+        return not coinciding(self.mesh.vertices, self.faces, glue, keys).left.size
+
+    @property
+    def areas(self) -> Floats:
+        return self.mesh.face_areas[self.kept]
+
+    def _keep(self, chosen: Booleans) -> None:
+        self.kept, self.faces, self.turned = self.kept[chosen], self.faces[chosen], self.turned[chosen]
+
+    def leave_out_faces(self) -> None:
+        """Leave out what is no surface of its own: edges without length, duplicates, inner walls."""
+        size, name = len(self.origin), self.original.name
+        become = drawn_together(self.mesh.vertices, self.faces, TINY * self.mesh.diagonal)
+        if n := int((become != self.origin).sum()):
+            self.changes.append(f"{plural(n, 'edge')} without length drawn together")
+            self.vertex_of = np.where(self.vertex_of >= 0, become, -1)
+            self.faces = become[self.faces]
+            self._keep(~(self.faces == self.faces[:, [1, 2, 0]]).any(axis=1))
+            if not len(self.faces):
+                raise MeshError(f"'{name}' has only faces without area: there is no surface")
+        _, first = np.unique(np.sort(self.faces, axis=1), axis=0, return_index=True)
+        if n := len(self.faces) - len(first):
+            self.changes.append(f"{plural(n, 'duplicate face')} left out")
+            single = np.zeros(len(self.faces), bool)
+            single[first] = True
+            self._keep(single)
+        walls = inner_walls(self.faces, self.areas, size)
+        if n := int(walls.sum()):
+            self.changes.append(f"{plural(n, 'inner face')} left out")
+            self._keep(~walls)
+
+    def glue_sides(self, keys: Floats | None) -> Glue:
+        """Return which sides are one edge, those included that coincide."""
+        edge = edges_of_sides(self.faces, len(self.origin))[1]
+        self._require_manifold(edge)
+        # each part to one side first, so that sides that run against each other can be told
+        apart = self._turned_to(glue_of(self.faces, twin_sides(edge)))
+        joints = coinciding(self.mesh.vertices, self.faces, apart, keys)
+        if not joints.left.size or self._closed_by(joints, apart):
+            return apart
+        self.changes.append(f"{plural(len(joints.left), 'edge')} joined along which it is cut open")
+        return apart.with_others(joints)
+
+    def _require_manifold(self, edge: Integers) -> None:
+        """Raise if edges of three or more faces are left in what will be kept."""
+        side_count = np.bincount(edge)
+        crowded = np.flatnonzero(side_count > 2)
+        if not crowded.size:
+            return
+        order = np.argsort(edge, kind="stable")
+        same = edge[order[1:]] == edge[order[:-1]]
+        all_sides = Glue(order[1:][same], order[:-1][same], np.ones(int(same.sum()), bool))
+        part = all_sides.parts(len(self.faces))
+        main = int(np.argmax(np.bincount(part, self.areas)))
+        if n := len(np.intersect1d(crowded, edge.reshape(-1, 3)[part == main] if self.largest_part else edge)):
             raise MeshError(
-                f"'{mesh.name}' has {plural(n, 'edge')} in three or more faces: delete the extra faces"
-            ) from error
-        raise
+                f"'{self.original.name}' has {plural(n, 'edge')} in three or more faces: delete the extra faces"
+            )
 
+    def _closed_by(self, joints: Glue, apart: Glue) -> bool:
+        """Return whether joining closes a surface, or makes a handle, that someone has cut open to a disc."""
+        m, areas = len(self.faces), self.areas
+        whole = apart.with_others(joints)
+        part, before = whole.parts(m), apart.parts(m)
+        largest = part == np.argmax(np.bincount(part, areas))
+        main = before == np.argmax(np.bincount(before, areas * largest))
+        if areas[main].sum() < CUT_OPEN * areas[largest].sum():
+            return False
+        loops, handles = shape_of(int(largest.sum()), whole.among(largest))
+        own_loops, own_handles = shape_of(int(main.sum()), apart.among(main))
+        return (loops == 0 or handles > own_handles) and own_loops > 0
 
-def _pairs(mesh: TriangleMesh, kept: Integers) -> tuple[Integers, Integers, Booleans]:
-    """Return pairs of faces, as positions in `kept`, with a common edge, and whether they agree about the outside."""
-    faces = mesh.faces[kept]
-    edge = edges_of_sides(faces, len(mesh.vertices))[1]
-    order = np.argsort(edge, kind="stable")
-    shared = edge[order[1:]] == edge[order[:-1]]
-    left, right = order[:-1][shared], order[1:][shared]
-    start = directed_edges(faces)[:, 0]
-    return left // 3, right // 3, start[left] != start[right]
+    def keep_largest_part(self, glue: Glue) -> Glue:
+        """Leave out all parts but the one of largest area."""
+        part = glue.parts(len(self.faces))
+        area = np.bincount(part, self.areas)
+        if len(area) == 1:
+            return glue
+        self.changes.append(f"{plural(len(area) - 1, 'smaller part')} left out")
+        chosen = part == np.argmax(area)
+        self._keep(chosen)
+        return glue.among(chosen)
 
+    def turn(self, glue: Glue) -> Glue:
+        """Turn faces so that neighbours agree about the outside."""
+        glue = self._turned_to(glue)
+        if not glue.opposed.all():
+            raise MeshError(f"'{self.original.name}' has one side only, like a Möbius strip: cut it open")
+        if n := int(self.turned.sum()):
+            self.changes.append(f"{plural(n, 'face')} turned over")
+        return glue
 
-def _parts(mesh: TriangleMesh, kept: Integers) -> Integers:
-    left, right, _ = _pairs(mesh, kept)
-    links = coo_array((np.ones(len(left), np.int8), (left, right)), shape=(len(kept), len(kept)))
-    return connected_components(links, directed=False)[1]
+    def _turned_to(self, glue: Glue) -> Glue:
+        """Turn faces, in each part those with less area, where that makes all of it face one side."""
+        # as they came, or a part turned round as a whole would count as in order
+        turned = sides_to_turn(turned_glue(glue, self.turned), self.areas) ^ self.turned
+        if not turned.any():
+            return glue
+        self.faces = self.faces.copy()
+        self.faces[turned] = self.faces[turned][:, [0, 2, 1]]
+        self.turned = self.turned ^ turned
+        return turned_glue(glue, turned)
 
+    def name_vertices(self, glue: Glue) -> None:
+        """Let the vertices be those that the glue makes."""
+        size = len(self.origin)
+        faces, vertex_of, origin = vertices_of_glue(self.faces, glue, size)
+        if n := len(origin) - size:
+            self.changes.append(f"{plural(n, 'vertex')} split in which parts touch in a point only")
+        self._name(faces, vertex_of, origin)
 
-def _to_turn(mesh: TriangleMesh, kept: Integers) -> Booleans:
-    """Return which faces to turn, (m,), so that neighbours agree: in each part those with less area.
+    def _name(self, faces: Integers, vertex_of: Integers, origin: Integers) -> None:
+        self.faces, self.origin = faces, self.origin[origin]
+        self.vertex_of = np.where(self.vertex_of >= 0, vertex_of[self.vertex_of], -1)
 
-    Each face exists in both orientations; neighbours that agree connect like with like, others crosswise. A part that
-    can be oriented falls into two components, one with every face turned.
-    """
-    left, right, agree = _pairs(mesh, kept)
-    m = len(kept)
-    if agree.all():
-        return np.zeros(m, bool)
-    across = np.where(agree, right, right + m)
-    back = np.where(agree, right + m, right)
-    links = np.concatenate([left, left + m]), np.concatenate([across, back])
-    graph = coo_array((np.ones(len(links[0]), np.int8), links), shape=(2 * m, 2 * m))
-    label = connected_components(graph, directed=False)[1]
-    if (label[:m] == label[m:]).any():
-        raise MeshError(f"'{mesh.name}' has one side only, like a Möbius strip: cut it open")
-    area = mesh.face_areas[kept]
-    as_is = np.bincount(label, np.concatenate([area, np.zeros(m)]))
-    # equal areas: the first face of a part stays
-    tie = np.isclose(as_is[label[:m]], as_is[label[m:]], rtol=1e-12)
-    return np.where(tie, label[:m] > label[m:], as_is[label[:m]] < as_is[label[m:]])
+    def cut_handles(self, glue: Glue) -> None:
+        """Cut handles along loops that are short."""
+        m = len(self.faces)
+        if glue.parts(m).any():
+            return
+        handles = shape_of(m, glue)[1]
+        if not 0 < handles <= MOST:
+            return
+        mesh = TriangleMesh(self.mesh.vertices[self.origin], self.faces)
+        lengths, *named = cut_handles(mesh, glue, handles)
+        if lengths:
+            self.changes.append(f"{plural(len(lengths), 'handle')} cut through")
+            self._name(*named)
+
+    def result(self) -> Cleaned:
+        """Return the mesh in order."""
+        name = self.original.name
+        positions = self.mesh.vertices
+        if not self.changes:
+            return self._without_spikes(Cleaned.unchanged(self.original))
+        mesh = TriangleMesh(positions[self.origin], self.faces, name)
+        tidy = (self.kept, self.turned, tuple(self.changes), self.original.faces, self.vertex_of, self.origin)
+        return self._without_spikes(Cleaned(mesh, *tidy))
+
+    def _without_spikes(self, tidy: Cleaned) -> Cleaned:
+        mesh, moved = without_spikes(tidy.mesh)
+        if not moved.size:
+            return tidy
+        said = f"{plural(len(moved), 'vertex')} far off the surface put back"
+        return replace(tidy, mesh=mesh, changes=(*tidy.changes, said))

@@ -177,7 +177,7 @@ def test_the_blend_holds_the_two_scans_and_what_was_carried(finished: Path, buil
     kept = target.data.mobius_alignment
     assert (kept.source, kept.source_name) == (None, "Source scan")
     assert stored_alignment.exists(target, source)
-    assert kept.target_fingerprint == read_surface(target).mesh.fingerprint
+    assert kept.target_fingerprint == read_surface(target).rest.fingerprint
 
 
 def test_pictures_leave_no_data_behind(built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import files  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
-from mobius_extension.solver import topology  # noqa: E402
+from mobius_extension.solver import verdict  # noqa: E402
 
 
 @pytest.mark.parametrize("ending", files.FORMATS)
@@ -24,11 +24,11 @@ def test_a_sheet_survives_each_format(ending: str, tmp_path: Path) -> None:
     # a .blend holds the other object too
     name = ":Sheet" if ending == ".blend" else ""
     found = files.import_mesh(f"{tmp_path / 'sheet'}{ending}{name}").obj
-    surface = read_surface(found)
-    assert topology(surface.mesh).is_disc
+    assert verdict(read_surface(found).mesh, fill_holes=False).topology.is_disc
     # in the world, because importers may turn the object; in any order, because some renumber
     world = np.array([found.matrix_world @ vertex.co for vertex in found.data.vertices])
-    assert len(world) == len(expected)
+    repeated = ending in (".ply", ".glb", ".gltf")  # one vertex for each of its UVs: every quad is an island
+    assert len(world) == (4 * 36 if repeated else len(expected))
     assert np.abs(world[:, None] - expected).max(axis=2).min(axis=1).max() < 1e-5
     assert bool(found.data.uv_layers) == (ending != ".stl")
 
@@ -138,16 +138,42 @@ def test_names_with_colons_and_files_that_exist_are_told_apart(tmp_path: Path) -
     assert files.split_object_name(f"{odd}:Scan") == (odd, "Scan")
 
 
-def test_what_a_file_repeats_along_seams_is_joined_and_said(tmp_path: Path) -> None:
+def test_what_a_file_repeats_along_seams_stays_on_the_mesh_and_is_joined_for_the_computation(tmp_path: Path) -> None:
     obj = make_sheet("Sheet", 7)
     obj.data.uv_layers.new(name="UVMap")  # every quad its own island
     for ending in (".ply", ".glb"):
         files.export_mesh(obj, tmp_path / f"sheet{ending}")
     for ending in (".ply", ".glb"):
         imported = files.import_mesh(str(tmp_path / f"sheet{ending}"))
-        assert len(imported.obj.data.vertices) == 49
-        assert imported.joined == 4 * 36 - 49
-        assert "95 that repeat another one's place were joined" in str(imported.order_change())
+        assert len(imported.obj.data.vertices) == 4 * 36
+        assert imported.order_change() is None
+        found = verdict(read_surface(imported.obj).mesh)
+        assert found.topology.vertices == 49
+        assert found.repairs == ("60 edges joined along which it is cut open",)
+
+
+def test_lips_that_a_shape_key_opens_stay_apart(tmp_path: Path) -> None:
+    """A cut inside the sheet: closed for the computation, unless a key moves its sides apart."""
+    n, row = 11, 5
+    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
+    corners = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1).tolist()
+    quads = [(i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j) for i in range(10) for j in range(10)]
+    upper = {row * n + j: len(corners) + j - 3 for j in range(3, 8)}
+    corners += [corners[v] for v in upper]
+    quads = [tuple(upper.get(v, v) for v in quad) if k // 10 >= row else quad for k, quad in enumerate(quads)]
+    obj = make_object("Face", corners, quads)
+    assert verdict(read_surface(obj).mesh).repairs == ("6 edges joined along which it is cut open",)
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Open")
+    for v in upper.values():
+        key.data[v].co.y += 0.2
+    for _ in range(2):
+        surface = read_surface(obj)
+        assert surface.keys is not None
+        assert verdict(surface.mesh, keys=surface.keys).repairs == ("1 opening (12 edges) closed",)
+        files.export_mesh(obj, tmp_path / "face.glb")
+        files.new_scene()
+        obj = files.import_mesh(str(tmp_path / "face.glb")).obj
 
 
 def test_vertices_that_blender_leaves_out_of_an_obj_are_said(tmp_path: Path) -> None:

@@ -88,14 +88,14 @@ def test_the_line_under_a_picker() -> None:
     assert lines(make_sheet("Sheet", 9)) == ("disc, 81 vertices",)
     holes = make_sheet("Holes", 9, keep=lambda i, j: (i, j) not in ((2, 2), (2, 5), (5, 5)))
     assert lines(holes, fill_holes=True) == ("4 boundary loops:", "3 will be filled")
-    assert lines(holes) == ("3 openings:", "turn on Fill Holes")
+    assert lines(holes, fill_holes=False) == ("3 openings:", "turn on Fill Holes")
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     cube = make_object("Cube", corners, quads)
     assert lines(cube, fill_holes=True) == ("closed surface:", "cut it first")
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
-    assert lines(parts) == ("2 separate parts:", "keep one, or turn on Largest Part")
-    assert lines(parts, largest_part=True) == ("disc, 28 vertices",)
+    assert lines(parts, largest_part=False) == ("2 separate parts:", "keep one, or turn on Largest Part")
+    assert lines(parts) == ("disc, 28 vertices", "mended for the computation: 1")
 
 
 def test_an_edit_changes_the_line() -> None:

@@ -138,22 +138,23 @@ def test_align_and_transfer_with_openings(pair: tuple[Any, Any]) -> None:
 
 def test_the_panel_says_whether_the_mesh_can_be_used_with_what_is_switched_on() -> None:
     obj = holed()
-    assert topology_cache.line_of(obj, Repair()).is_disc is False
-    assert topology_cache.line_of(obj, Repair(fill_holes=True)).rows == ("3 boundary loops:", "2 will be filled")
+    assert topology_cache.line_of(obj, Repair(fill_holes=False)).is_disc is False
+    assert topology_cache.line_of(obj, Repair()).rows == ("3 boundary loops:", "2 will be filled")
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
-    assert topology_cache.line_of(parts, Repair(fill_holes=True)).is_disc is False
-    assert topology_cache.line_of(parts, Repair(largest_part=True)).rows == ("disc, 28 vertices",)
+    assert topology_cache.line_of(parts, Repair(largest_part=False)).is_disc is False
+    rows = "disc, 28 vertices", "mended for the computation: 1"
+    assert topology_cache.line_of(parts, Repair()).rows == rows
 
 
 # parts
 
 
-def test_the_largest_part_is_kept_on_request() -> None:
+def test_the_largest_part_is_kept_unless_that_is_switched_off() -> None:
     obj = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     before = shape(obj)
     with pytest.raises(RuntimeError, match="'Parts' has 2 separate parts"):
-        bpy.ops.mobius.flatten()
-    assert bpy.ops.mobius.flatten(largest_part=True, distortion="dilatation") == {"FINISHED"}
+        bpy.ops.mobius.flatten(largest_part=False)
+    assert bpy.ops.mobius.flatten(distortion="dilatation") == {"FINISHED"}
     assert shape(obj) == before
     small = np.array([loop.vertex_index % 7 <= 2 for loop in obj.data.loops])
     uv = corner_values(obj, "Mobius Disc")
@@ -433,12 +434,16 @@ def test_align_and_transfer_commands(scans: Path, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("status", "arguments", "reason"),
     [
-        (1, ["flatten", "holed.obj", "-o", "o.obj"], "'holed.obj' has 3 boundary loops"),
-        (1, ["flatten", "parts.obj", "-o", "o.obj", "--fill-holes"], "'parts.obj' has 2 separate parts"),
+        (1, ["flatten", "holed.obj", "-o", "o.obj", "--keep-holes"], "'holed.obj' has 3 boundary loops"),
+        (1, ["flatten", "parts.obj", "-o", "o.obj", "--keep-parts"], "'parts.obj' has 2 separate parts"),
         (1, ["flatten", "branching.obj", "-o", "o.obj", "--fill-holes"], "has 1 edge in three or more faces"),
-        (1, ["align", "sheet.obj", "holed.obj", "--largest-part"], "'holed.obj' has 3 boundary loops"),
+        (1, ["align", "sheet.obj", "holed.obj", "--keep-holes"], "'holed.obj' has 3 boundary loops"),
         (1, ["flatten", "holed.obj", "-o", "o.obj", "--fill-holes", "--outer", "25"], "on none of its boundary loops"),
-        (2, ["flatten", "holed.obj", "-o", "o.obj", "--outer", "1"], "--outer chooses among the boundaries that"),
+        (
+            2,
+            ["flatten", "holed.obj", "-o", "o.obj", "--keep-holes", "--outer", "1"],
+            "--outer chooses among several boundaries, which --keep-holes refuses",
+        ),
         (2, ["flatten", "holed.obj", "-o", "o.obj", "--fill-holes", "--outer", "-1"], "--outer -1: 'holed.obj' has"),
         (
             2,

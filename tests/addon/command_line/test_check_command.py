@@ -19,13 +19,25 @@ def test_check_prints_a_line_per_mesh(scans: Path, capsys: pytest.CaptureFixture
     ]
 
 
-def test_check_exits_1_for_what_is_no_disc_and_2_for_what_is_unreadable(
+def test_check_says_what_will_be_done_about_a_mesh(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = run(capsys, "check", scans / "hole.obj", scans / "parts.obj")
+    assert (status, err) == (0, "")
+    assert "hole.obj: disc, 36 vertices, boundary of 20 edges; for the computation: 1 opening (4 edges) closed" in out
+    assert "; for the computation: 1 smaller part left out" in out.splitlines()[1]
+
+
+def test_check_exits_1_for_what_can_be_no_disc_and_2_for_what_is_unreadable(
     scans: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, out, err = run(capsys, "check", scans / "hole.obj", scans / "parts.obj", scans / "target.obj")
+    corners = [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    (scans / "cube.obj").write_text(
+        "\n".join([*corners, "f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"])
+    )
+    (scans / "line.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    status, out, err = run(capsys, "check", scans / "cube.obj", scans / "line.obj", scans / "target.obj")
     assert (status, err) == (1, "")
-    assert "hole.obj: not a disc: it has 2 boundary loops (20 and 4 edges)" in out
-    assert "parts.obj: not a disc: it has 2 separate parts" in out
+    assert "cube.obj: cannot be used: it is closed (it has no boundary)" in out
+    assert "line.obj: cannot be used: it has only faces without area" in out
     assert len(out.splitlines()) == 3
     status, out, err = run(capsys, "check", scans / "gone.obj", scans / "target.obj")
     assert status == 2

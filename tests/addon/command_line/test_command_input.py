@@ -14,11 +14,12 @@ from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 @pytest.mark.parametrize(
     ("status", "arguments", "reason"),
     [
-        (1, ["align", "hole.obj", "target.obj"], "'hole.obj' has 2 boundary loops (20 and 4 edges)"),
-        (1, ["align", "target.obj", "parts.obj"], "'parts.obj' has 2 separate parts"),
+        (1, ["align", "hole.obj", "target.obj", "--keep-holes"], "'hole.obj' has 2 boundary loops (20 and 4 edges)"),
+        (1, ["align", "target.obj", "parts.obj", "--keep-parts"], "'parts.obj' has 2 separate parts"),
         (1, ["align", "target.obj", "./target.obj"], "is both source and target: give two meshes"),
-        (1, ["flatten", "hole.obj", "-o", "out.obj"], "'hole.obj' has 2 boundary loops"),
-        (1, ["transfer", "hole.obj", "target.obj", "-o", "out.obj"], "'hole.obj' has 2 boundary loops"),
+        (1, ["flatten", "hole.obj", "-o", "out.obj", "--keep-holes"], "'hole.obj' has 2 boundary loops"),
+        (1, ["transfer", "hole.obj", "target.obj", "-o", "o.obj", "--keep-holes"], "'hole.obj' has 2 boundary loops"),
+        (2, ["align", "hole.obj", "target.obj", "--keep-holes", "--fill-holes"], "not allowed with argument"),
         (1, ["transfer", "target.obj", "source.obj", "-o", "o.blend", "--only", "colors", *QUICK], "has no color attr"),
         (2, ["align", "gone.obj", "target.obj"], "there is no file 'gone.obj'"),
         (2, ["align", "target.obj", "notes.txt"], "'notes.txt' has an ending that is not known"),

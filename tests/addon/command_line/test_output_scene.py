@@ -27,12 +27,17 @@ def opened(path: Path) -> Any:
     return bpy.data.objects["Target"]
 
 
+def remarks(err: str) -> list[str]:
+    """What is said, but for how a coarse sheet is read."""
+    return [line for line in err.splitlines() if not line.endswith("smoothed, for the computation only")]
+
+
 def test_a_rig_keeps_its_mesh(tmp_path: Path, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = Scene(parent="BONE", scale=(100, 100, 100), modifiers=("ARMATURE",), keys=1, key_driver=True)
     path = build(scene, tmp_path / "rig")
     world = np.array(opened(path).matrix_world)
     status, _, err = run(capsys, "transfer", source, f"{path}:Target", "-o", tmp_path / "out.blend", *CARRY)
-    assert (status, err) == (0, "")
+    assert (status, remarks(err)) == (0, [])
     target = opened(tmp_path / "out.blend")
     rig = bpy.data.objects["Rig"]
     assert (target.parent, target.parent_bone, target.modifiers[0].object) == (rig, "Own 0", rig)
@@ -143,14 +148,14 @@ def test_what_is_linked_is_read_and_neither_changed_nor_replaced(
     status, _, err = run(capsys, "flatten", f"{path}:Target", "-o", library)
     assert (status, "is linked by the file that would be written there" in err) == (1, True)
     status, _, err = run(capsys, "transfer", f"{path}:Linked", f"{path}:Target", "-o", out, *CARRY)
-    assert (status, err) == (0, "")
+    assert (status, remarks(err)) == (0, [])
     assert weights(opened(out), "From Library").max() == pytest.approx(0.5)
     mesh = bpy.data.objects["Linked"].data
     assert mesh.library is not None
     # so it is from another file, which leaves nothing behind
     other = build(Scene(), tmp_path / "other")
     status, _, err = run(capsys, "transfer", f"{path}:Linked", f"{other}:Target", "-o", out, *CARRY)
-    assert (status, err) == (0, "")
+    assert (status, remarks(err)) == (0, [])
     assert weights(opened(out), "From Library").max() == pytest.approx(0.5)
     assert not bpy.data.libraries
     assert not any(x.name.startswith("Linked") for x in bpy.data.objects)
@@ -166,7 +171,7 @@ def test_each_of_several_targets_of_one_file_has_its_scene(
     results = tmp_path / "results"
     results.mkdir()
     status, _, err = run(capsys, "transfer", source, f"{path}:Target", f"{path}:Second", "-o", results, *CARRY)
-    assert (status, err) == (0, "")
+    assert (status, remarks(err)) == (0, [])
     assert listing(results) == ["scene Second.blend", "scene Target.blend"]
     for name, other in (("Target", "Second"), ("Second", "Target")):
         opened(results / f"scene {name}.blend")

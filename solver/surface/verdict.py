@@ -1,0 +1,72 @@
+"""What a mesh is and what will be done about it, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .cleaning import cleaned
+from .mesh import Floats, Integers, TriangleMesh, plural
+from .tidy import Cleaned
+from .topology import Topology, require_disc
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """A mesh that can be used.
+
+    Attributes
+    ----------
+    tidy : Cleaned
+        The mesh in order.
+    topology : Topology
+        Of that.
+    """
+
+    tidy: Cleaned
+    topology: Topology
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What will be done for the computation, each as the rest of a sentence."""
+        loops = list(self.topology.boundary_loops)
+        del loops[int(np.argmax(self.topology.loop_lengths))]
+        closed = closing(loops)
+        return (*self.tidy.changes, closed) if closed else self.tidy.changes
+
+    def describe(self) -> str:
+        """Return one line that says what the mesh is and what will be done about it."""
+        found = self.topology
+        rim = found.boundary_loops[int(np.argmax(found.loop_lengths))]
+        text = f"disc, {found.vertices:,} vertices, boundary of {len(rim):,} edges"
+        used = np.zeros(self.tidy.size, bool)
+        used[self.tidy.original_faces] = True
+        if n := int((~used).sum()):
+            text += f", {plural(n, 'loose vertex')}"
+        if n := len(found.zero_area_faces):
+            text += f", {plural(n, 'face')} without area"
+        return f"{text}; for the computation: {', '.join(self.repairs)}" if self.repairs else text
+
+
+def verdict(
+    mesh: TriangleMesh, *, largest_part: bool = True, fill_holes: bool = True, keys: Floats | None = None
+) -> Verdict:
+    """Return what a mesh is when it is put in order as asked; see `cleaned`.
+
+    Raises
+    ------
+    MeshError
+        It cannot be made a disc; the text says why and what to do.
+    """
+    tidy = cleaned(mesh, largest_part=largest_part, fill_holes=fill_holes, keys=keys)
+    return Verdict(tidy, require_disc(tidy.mesh, fill_holes=fill_holes))
+
+
+def closing(openings: Sequence[Integers]) -> str:
+    """Say that these boundary loops will be closed; nothing if there is none."""
+    if not openings:
+        return ""
+    edges = ", ".join(f"{len(loop):,}" for loop in openings[:6]) + (", ..." if len(openings) > 6 else "")
+    return f"{plural(len(openings), 'opening')} ({edges} edges) closed"
