@@ -6,6 +6,7 @@ None of this depends on what it is aligned with, so that many targets, pieces an
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -94,7 +95,8 @@ class Surface:
                 f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
                 "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
             )
-        return found
+        tidy = self.cleaned.mesh
+        return found if found.mesh is tidy else replace(found, exact=tidy.vertices)
 
     @property
     def mesh(self) -> TriangleMesh:

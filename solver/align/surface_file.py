@@ -87,7 +87,9 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     mesh = surface.cleaned.mesh
     size, computed = len(mesh.vertices), stored["computed"]
     _require(computed.shape == mesh.vertices.shape, "the vertices as they are computed with")
+    exact = None
     if not np.array_equal(computed, mesh.vertices):
+        exact = mesh.vertices
         mesh = TriangleMesh(computed, mesh.faces, mesh.name)
     disc = stored["disc"].astype(np.complex128, casting="safe")
     _require(disc.shape == (size,) and (np.isfinite(disc) == mesh.used).all(), "the disc")
@@ -102,6 +104,7 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
         tuple(np.split(holes, ends[:-1])) if len(ends) else (),
         int(stored["flips_repaired"]),
         float(stored["rim_lost"]),
+        exact,
     )
     surface.known(flat)
     if "descriptors" in stored:

@@ -75,6 +75,8 @@ class Draft:
         The target; mirrored, with its faces turned, where the Möbius transformation is reflected.
     conformal : (n,) complex128
         Where the Möbius transformation carries each target vertex in the source's disc; nan at vertices in no face.
+    growth : float
+        What brings the target to the source's scale.
     unbent : (n, 3) float64
         The target's vertices in the source's scale.
     few : Coarse
@@ -88,6 +90,7 @@ class Draft:
     onto: SurfacePoints
     whole: TriangleMesh
     conformal: Complexes
+    growth: float
     unbent: Floats
     few: Coarse
     flat: TriangleMesh
@@ -172,7 +175,7 @@ def drafted(
     tell(0.0)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
-    return Draft(onto, whole, conformal, unbent, few, flat, rest, now)
+    return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now)
 
 
 def _best_start(
@@ -238,9 +241,14 @@ def finished(
     drawn = drawn[fine.nodes]
     settled = relaxed(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
     tell(0.8)
-    all_places = fine.following(unbent[fine.nodes], settled, unbent)
-    all_places[fine.nodes] = settled
-    normals = TriangleMesh(all_places, draft.whole.faces).vertex_normals()
+    exact = unbent
+    if target.exact is not None:  # where smoothing has moved it along the surface it would go astray by as much
+        exact = target.exact * ([-1, 1, 1] if order == [0, 2, 1] else [1, 1, 1]) * draft.growth
+    all_places = fine.following(unbent[fine.nodes], settled, exact)
+    if exact is unbent:
+        all_places[fine.nodes] = settled
+    smooth = all_places if exact is unbent else fine.following(unbent[fine.nodes], settled, unbent)
+    normals = TriangleMesh(smooth, draft.whole.faces).vertex_normals()
     face, barycentric = onto.nearest_point(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
     )

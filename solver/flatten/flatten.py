@@ -11,7 +11,7 @@ from ..mobius import Mobius, conformal_barycentre
 from ..surface.holes import filled
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
-from ..surface.mesh import Complexes, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
+from ..surface.mesh import Complexes, Floats, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
 from .circle import lost_rim, on_circle
 from .circle_packing import packed
@@ -42,6 +42,8 @@ class Flattening:
         Triangles that were turned over in the conformal map and put right by moving the vertices around them.
     rim_lost : float
         Share of the outer boundary's length, in [0, 1], where numbers cannot carry its angles: see `circle.lost_rim`.
+    exact : (n, 3) float64 or None
+        Where the vertices are; None: where the mesh has them, which was not smoothed for the computation.
     """
 
     mesh: TriangleMesh
@@ -50,6 +52,7 @@ class Flattening:
     holes: tuple[Integers, ...] = ()
     flips_repaired: int = 0
     rim_lost: float = 0.0
+    exact: Floats | None = None
 
     @cached_property
     def distortion(self) -> Distortion:

@@ -19,7 +19,7 @@ ROUGH = 0.01
 scans and templates have 0.006 or less, noise of 0.1 % of the diagonal on meshes of 10,000 triangles makes 0.03, of
 0.3 % 0.4."""
 
-WORTH = 0.05
+WORTH = 0.1
 """Share of the roughness at first that a further step has to take off."""
 
 MOSTLY = 0.5
