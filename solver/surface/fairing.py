@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
 from .cholesky import factorised
+from .descriptors import DIFFUSION_TIMES
 from .mesh import Floats, Integers, TriangleMesh, face_neighbours
 
 ROUGH = 0.01
@@ -58,8 +59,11 @@ def _differing(normals: Floats, areas: Floats, one: Integers, other: Integers) -
 def faired(mesh: TriangleMesh) -> TriangleMesh:
     """Return the mesh with its roughness taken off; the mesh itself if it is not rough, or not made less so.
 
-    Vertices on the boundary stay where they are.
+    So is one whose edges are longer than the least distance over which curvature is looked at: what its triangles
+    differ by is the surface's own bending, as far as they show it. Vertices on the boundary stay where they are.
     """
+    if np.median(mesh.edge_lengths) > np.sqrt(2 * DIFFUSION_TIMES[0] * mesh.area):
+        return mesh
     at_first = roughness(mesh)
     if at_first <= ROUGH:
         return mesh

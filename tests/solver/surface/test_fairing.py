@@ -63,6 +63,13 @@ def test_a_crease_is_no_roughness() -> None:
     assert np.abs(fair.vertices - roof.vertices).max() < 0.05
 
 
+def test_a_coarse_mesh_is_no_noise() -> None:
+    coarse = bumps(120, seed=0)
+    rough = noisy(coarse, 0.02)
+    assert roughness(rough) > ROUGH
+    assert faired(rough) is rough
+
+
 def test_a_single_triangle_is_left_alone() -> None:
     one = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
     assert faired(one) is one
