@@ -201,7 +201,7 @@ def test_duplicate_and_turned_faces_are_put_in_order_for_the_computation(capfd: 
 def test_a_face_that_uses_a_vertex_twice_is_left_out() -> None:
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     mesh = TriangleMesh(corners, np.array([(0, 1, 2), (0, 1, 1), (0, 2, 3)]), "Scan")
-    tidy = in_order(mesh)
+    tidy = in_order(mesh, Repair())
     assert tidy.mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert tidy.changes == ("1 face with a vertex used twice left out",)
 
@@ -259,9 +259,9 @@ def test_a_surface_with_one_side_is_refused() -> None:
 
 def test_a_clean_mesh_is_not_copied() -> None:
     mesh = read_surface(make_sheet("Sheet", 5)).mesh
-    assert in_order(mesh, largest_part=True).mesh is mesh
+    assert in_order(mesh, Repair(True, True)).mesh is mesh
     with pytest.raises(MeshError, match="has only faces that use a vertex twice"):
-        in_order(TriangleMesh(mesh.vertices, np.array([(0, 0, 1)]), "Bad"))
+        in_order(TriangleMesh(mesh.vertices, np.array([(0, 0, 1)]), "Bad"), Repair())
 
 
 def test_a_concave_polygon_is_cut_as_blender_draws_it() -> None:
