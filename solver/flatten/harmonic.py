@@ -13,8 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
 
 from ..surface.cholesky import factorised
-from ..surface.intrinsic_delaunay import IntrinsicTriangulation, with_interior, without_chords
-from ..surface.laplacian import cotangents
+from ..surface.intrinsic_delaunay import IntrinsicTriangulation, edge_weights, with_interior, without_chords
 from ..surface.mesh import Complexes, Floats, Integers
 from .circle import angles_of_arcs
 
@@ -48,12 +47,7 @@ def riemann_map(surface: IntrinsicTriangulation, boundary: Integers) -> Complexe
 
 def _dirichlet_systems(surface: IntrinsicTriangulation, boundary: Integers) -> tuple[Integers, csc_array, csr_array]:
     """Return the interior vertices, their Laplacian and the weights that tie them to the boundary: A x = B values."""
-    sides = np.flatnonzero(surface.twins < np.arange(len(surface.twins)))
-    half = 0.5 * cotangents(surface.lengths).ravel()
-    weight = np.maximum(half[sides] + np.where(surface.twins[sides] >= 0, half[surface.twins[sides]], 0), 0)
-    face, k = np.divmod(sides, 3)
-    i, j = surface.faces[face, (k + 1) % 3], surface.faces[face, (k + 2) % 3]
-
+    i, j, weight = edge_weights(surface)
     n = surface.vertex_count
     inside = np.zeros(n, bool)
     inside[surface.faces] = True

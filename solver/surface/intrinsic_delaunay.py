@@ -80,17 +80,25 @@ def intrinsic_delaunay(start: IntrinsicTriangulation, tolerance: float = 1e-10) 
     return IntrinsicTriangulation(faces, lengths, twins, start.vertex_count)
 
 
-def non_negative_laplacian(surface: IntrinsicTriangulation) -> csr_array:
-    """Return the Laplacian of an intrinsic Delaunay triangulation, (n, n), no weight of which is negative.
+def edge_weights(surface: IntrinsicTriangulation) -> tuple[Integers, Integers, Floats]:
+    """Return the ends of all edges, (e,) each, and their cotangent weights, (e,), none of which is negative.
 
-    That of an edge on the boundary, which has one angle opposite, is 0 where that is obtuse. Diffusion by it is a mean:
-    what comes out lies between the least and the largest of what went in.
+    On an intrinsic Delaunay triangulation no inner edge's is; that of an edge on the boundary, which has one angle
+    opposite, is taken as 0 where that is obtuse.
     """
     sides = np.flatnonzero(surface.twins < np.arange(len(surface.twins)))
     half = 0.5 * cotangents(surface.lengths).ravel()
     weight = np.maximum(half[sides] + np.where(surface.twins[sides] >= 0, half[surface.twins[sides]], 0), 0)
     face, k = np.divmod(sides, 3)
-    i, j = surface.faces[face, (k + 1) % 3], surface.faces[face, (k + 2) % 3]
+    return surface.faces[face, (k + 1) % 3], surface.faces[face, (k + 2) % 3], weight
+
+
+def non_negative_laplacian(surface: IntrinsicTriangulation) -> csr_array:
+    """Return the Laplacian, (n, n), of the weights that `edge_weights` returns.
+
+    Diffusion by it is a mean: what comes out lies between the least and the largest of what went in.
+    """
+    i, j, weight = edge_weights(surface)
     rows, columns = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
     values = np.concatenate([-weight, -weight, weight, weight])
     size = surface.vertex_count

@@ -1,32 +1,10 @@
 import numpy as np
 import pytest
-from correspondences import planar_correspondence
+from correspondences import on_itself, planar_correspondence, sheet
 
 from solver import Correspondence, TriangleMesh, interpolate_corners
 from solver.carry.charts import value_islands
 from solver.carry.corners import CornerInterpolation
-
-
-def sheet(n: int, m: int | None = None) -> tuple[TriangleMesh, np.ndarray]:
-    """A square sheet over [-1, 1] squared of n x m vertices, and the quad of each triangle."""
-    m = m or n
-    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, m))
-    at = np.arange(n * m).reshape(m, n)
-    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
-    triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(n * m)], axis=1)
-    return TriangleMesh(vertices, triangles), np.repeat(np.arange(len(quads)), 2)
-
-
-def on_itself(mesh: TriangleMesh, seed: int) -> Correspondence:
-    """Each vertex at itself, located in any of the triangles around it: nothing prefers one side of a seam."""
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(mesh.faces.size)
-    face = np.empty(len(mesh.vertices), int)
-    face[mesh.faces.ravel()[order]] = order // 3
-    barycentric = (mesh.faces[face] == np.arange(len(mesh.vertices))[:, None]).astype(float)
-    everywhere = np.ones(len(face), bool)
-    return Correspondence(face, barycentric, everywhere, everywhere.astype(float), mesh.faces, len(mesh.vertices))
 
 
 def two_charts(mesh: TriangleMesh) -> np.ndarray:
