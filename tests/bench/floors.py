@@ -58,9 +58,11 @@ def main(output: str) -> None:
         axes.add_patch(box)
         axes.text(0.25, level + 0.47, f"{floor}/", weight="bold", size=13, va="center")
         names = modules(floor)
-        half = (len(names) + 1) // 2
-        for row, some in enumerate((names[:half], names[half:])):
-            axes.text(1.75, level + 0.66 - 0.36 * row, "   ".join(some), size=8.5, va="center", family="monospace")
+        rows = 3 if len(names) > 17 else 2
+        each = -(-len(names) // rows)
+        for row in range(rows):
+            some, height = names[row * each : (row + 1) * each], 0.47 + 0.5 / rows * ((rows - 1) / 2 - row)
+            axes.text(1.75, level + height, "   ".join(some), size=8.5, va="center", family="monospace")
     arrows = imports()
     for (above, below), count in arrows.items():
         if below in BETWEEN:
