@@ -91,7 +91,9 @@ def add_source(folder: Path) -> Any:
     source.vertex_groups.new(name="From Source").add(range(100), 0.5, "REPLACE")
     source.data.uv_layers.new(name="Source UV")
     source.shape_key_add(name="Basis", from_mix=False)
-    source.shape_key_add(name="Source Key", from_mix=False).points[80].co.z += 0.1
+    key = source.shape_key_add(name="Source Key", from_mix=False)
+    key.value = 0  # Blender 5 begins with 1
+    key.points[80].co.z += 0.1
     _material(source, "Source Material", save_picture(folder / "skin.png", (1, 0, 0)))
     return source
 
