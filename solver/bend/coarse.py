@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay, KDTree
 
 from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc
+from ..flatten.locate import TriangulatedDisc, plane
 from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
 from ..surface.sampling import edge_graph, thinned
@@ -75,7 +75,7 @@ def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     rim = flattening.boundary[:: max(1, round(len(flattening.boundary) / (3.5 * np.sqrt(count))))]
     nodes = np.concatenate([inner[thinned(mesh.vertices[inner], np.sqrt(0.53 * mesh.area / count))], rim])
     disc = flattening.disc
-    apart = KDTree(_plane(disc[nodes])).query(_plane(disc[nodes]), k=2)[0][:, 1].min()
+    apart = KDTree(plane(disc[nodes])).query(plane(disc[nodes]), k=2)[0][:, 1].min()
     if apart > CROWDED:
         nodes, faces = _delaunay(disc, nodes)
         leaders, weights = TriangulatedDisc.of(disc[nodes], faces).locate(disc[used])
@@ -92,13 +92,9 @@ def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     return Coarse(nodes, faces[:, order], used, leaders, weights)
 
 
-def _plane(points: Complexes) -> Floats:
-    return np.stack([points.real, points.imag], axis=1)
-
-
 def _delaunay(disc: Complexes, nodes: Integers) -> tuple[Integers, Integers]:
     """Return the nodes and their Delaunay triangles in the disc, (f, 3), without slivers."""
-    faces = Delaunay(_plane(disc[nodes])).simplices.astype(np.intp)
+    faces = Delaunay(plane(disc[nodes])).simplices.astype(np.intp)
     turned = signed_areas(disc[nodes], faces)
     faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]
     held, place = np.unique(faces, return_inverse=True)

@@ -34,7 +34,7 @@ class TriangulatedDisc:
     def of(points: Complexes, faces: Integers) -> TriangulatedDisc:
         """Prepare the triangulation with these points, (n,), and faces, (m, 3)."""
         used, first = np.unique(faces.ravel(), return_index=True)
-        tree = KDTree(_plane(points[used]))
+        tree = KDTree(plane(points[used]))
         return TriangulatedDisc(points, faces, face_neighbours(faces, len(points)), tree, first // 3)
 
     def locate(self, queries: Complexes) -> tuple[Integers, Floats]:
@@ -43,7 +43,7 @@ class TriangulatedDisc:
         A query outside the triangulation (between the circle and the polygon inscribed in it) gets the nearest point of
         the boundary side it lies beyond.
         """
-        face = self._face_of_leaf[self._tree.query(_plane(queries))[1]]
+        face = self._face_of_leaf[self._tree.query(plane(queries))[1]]
         inside = np.zeros(len(queries), bool)
         open_queries = np.arange(len(queries))
         previous = np.full(len(queries), -1)
@@ -82,7 +82,7 @@ class TriangulatedDisc:
     def _nearest_face(self, queries: Complexes, candidates: int = 24) -> Integers:
         """Return the face nearest to each query among those around the nearest vertices."""
         k = min(candidates, self._tree.n)
-        near = np.asarray(self._tree.query(_plane(queries), k=k)[1]).reshape(len(queries), k)
+        near = np.asarray(self._tree.query(plane(queries), k=k)[1]).reshape(len(queries), k)
         start = self._face_of_leaf[near]
         best, best_distance = start[:, 0].copy(), np.full(len(queries), np.inf)
         tried = np.concatenate([start, self.neighbours[start].reshape(len(queries), -1)], axis=1)
@@ -117,5 +117,6 @@ class TriangulatedDisc:
         return weights
 
 
-def _plane(points: Complexes) -> Floats:
+def plane(points: Complexes) -> Floats:
+    """Return complex numbers, (n,), as points of the plane, (n, 2)."""
     return np.stack([points.real, points.imag], axis=1)

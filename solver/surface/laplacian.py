@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, dia_array
+from scipy.sparse import coo_array, csr_array
 
 from .mesh import Floats, Integers, TriangleMesh
 
@@ -50,9 +50,3 @@ def cotangent_laplacian(faces: Integers, lengths: Floats, vertex_count: int) -> 
 def laplacian(mesh: TriangleMesh) -> csr_array:
     """Return the cotangent Laplacian of a mesh, (n, n), of mollified side lengths."""
     return cotangent_laplacian(mesh.faces, mollified_lengths(mesh.edge_lengths), len(mesh.vertices))
-
-
-def mass(mesh: TriangleMesh) -> dia_array:
-    """Return the lumped mass matrix, (n, n), of barycentric areas, in squared length units."""
-    n = len(mesh.vertices)
-    return dia_array((mesh.vertex_areas[None], [0]), shape=(n, n))
