@@ -323,4 +323,9 @@ GERMAN = {
     "{:.2f} of {:.2f}": "{:.2f} von {:.2f}",
     "{} is under way: press ESC to stop it": "{} läuft: ESC bricht ab",
     "{} stopped: nothing was changed": "{} abgebrochen: Nichts wurde geändert",
+    " (warnings: {}, see Last Transfer)": " (Warnungen: {}, siehe Letzte Übertragung)",
+    "Last Transfer": "Letzte Übertragung",
+    "From '{}'": "Von „{}“",
+    "{:.1%} of the area is uncertain": "{:.1%} der Fläche sind unsicher",
+    "and {:,} more": "und {:,} weitere",
 }

@@ -112,12 +112,14 @@ def register() -> None:
     bpy.types.Scene.mobius = bpy.props.PointerProperty(type=MobiusSettings)
     bpy.types.Mesh.mobius_alignment = bpy.props.PointerProperty(type=MobiusAlignment)
     bpy.types.Mesh.mobius_before = bpy.props.StringProperty()  # as `attributes.note` keeps it
+    bpy.types.Mesh.mobius_transferred = bpy.props.StringProperty()  # as `last_transfer` keeps it
     bpy.types.WindowManager.mobius_view = bpy.props.PointerProperty(type=MobiusView)
 
 
 def unregister() -> None:
     """Undo `register`."""
     del bpy.types.WindowManager.mobius_view
+    del bpy.types.Mesh.mobius_transferred
     del bpy.types.Mesh.mobius_before
     del bpy.types.Mesh.mobius_alignment
     del bpy.types.Scene.mobius

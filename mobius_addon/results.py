@@ -185,5 +185,6 @@ def clear_results(obj: bpy.types.Object) -> int:
     own.put_back(obj)
     mesh.property_unset("mobius_alignment")
     mesh.property_unset("mobius_before")
+    mesh.property_unset("mobius_transferred")
     mesh.update()
     return removed

@@ -66,7 +66,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
     from ...solver import load_map, report, save_map
     from ..files import Unreadable, outputs, write_mesh
-    from ..operators.transfer import describe_counts, read_through
+    from ..last_transfer import describe_counts
+    from ..operators.transfer import read_through
 
     choices = transfer_settings(options)
     settings = align_settings(options)

@@ -3,6 +3,7 @@
 import bpy
 
 from ..operators.conformal_transfer import MOBIUS_OT_conformal_transfer
+from .last_transfer import MOBIUS_PT_last_transfer
 from .main import MOBIUS_PT_main
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
@@ -22,6 +23,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
         MOBIUS_PT_result,
         MOBIUS_PT_pictures,
         MOBIUS_PT_transfer,
+        MOBIUS_PT_last_transfer,
         MOBIUS_PT_transfer_settings,
         MOBIUS_PT_scans,
         MOBIUS_PT_alignment,
