@@ -16,6 +16,7 @@ from . import (
     side_by_side,
     swap,
     transfer,
+    wrap,
 )
 
 _register, _unregister = register_factory(
@@ -25,6 +26,7 @@ _register, _unregister = register_factory(
         swap.MOBIUS_OT_swap,
         align.MOBIUS_OT_align,
         transfer.MOBIUS_OT_transfer,
+        wrap.MOBIUS_OT_wrap,
         select_unmatched.MOBIUS_OT_select_unmatched,
         conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,

@@ -3,6 +3,7 @@
 import bpy
 
 from ..operators.conformal_transfer import MOBIUS_OT_conformal_transfer
+from .fitted import MOBIUS_PT_fitted
 from .last_transfer import MOBIUS_PT_last_transfer
 from .main import MOBIUS_PT_main
 from .result import MOBIUS_PT_result
@@ -25,6 +26,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
         MOBIUS_PT_transfer,
         MOBIUS_PT_last_transfer,
         MOBIUS_PT_transfer_settings,
+        MOBIUS_PT_fitted,
         MOBIUS_PT_scans,
         MOBIUS_PT_alignment,
     )

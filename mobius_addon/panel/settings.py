@@ -17,7 +17,7 @@ class MOBIUS_PT_scans(MobiusSubPanel, bpy.types.Panel):
 
     bl_label = "Scans"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 4
+    bl_order = 5
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings."""
@@ -38,7 +38,7 @@ class MOBIUS_PT_alignment(MobiusSubPanel, bpy.types.Panel):
 
     bl_label = "Alignment Settings"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 5
+    bl_order = 6
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the menu of presets."""

@@ -20,9 +20,10 @@ from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     shown_by,
     vertex_dilatations,
 )
-from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION, similarity  # noqa: E402
+from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION  # noqa: E402
 from mobius_extension.mobius_addon.overlay.matches import chosen_matches  # noqa: E402
 from mobius_extension.solver import Correspondence, TriangleMesh  # noqa: E402
+from mobius_extension.solver.carry.fitted import similarity  # noqa: E402
 
 ACCURATE = QUICK | {"samples": 40, "targets": 300, "refine": "mobius"}
 
