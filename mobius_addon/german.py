@@ -341,4 +341,13 @@ GERMAN = {
     "'{}' was removed or edited meanwhile: call it again": "„{}“ wurde inzwischen entfernt oder geändert: noch einmal aufrufen",
     "'{}' is new: {:.0%} of its vertices lie where the map says, the others are filled smoothly": "„{}“ ist neu: {:.0%} seiner Vertices liegen, wo die Abbildung sagt, die anderen sind glatt gefüllt",
     "'{}' has folded triangles: {:,}. Smooth them in Sculpt Mode": "„{}“ hat gefaltete Dreiecke: {:,}. Im Modus Sculpt glätten",
+    "Attribute": "Attribut",
+    "Vertex group or attribute of the source that the target follows": "Vertex-Gruppe oder Attribut der Quelle, dem das Ziel folgt",
+    "Follow Live": "Laufend folgen",
+    "Have the target follow an attribute of the source by a modifier: what is changed on the source later changes here too": "Das Ziel durch einen Modifikator einem Attribut der Quelle folgen lassen: Was dort später geändert wird, ändert sich auch hier",
+    "Live": "Laufend",
+    "Choose an attribute of the source first": "Zuerst ein Attribut der Quelle wählen",
+    "'{}' follows '{}' of '{}'": "„{}“ folgt „{}“ von „{}“",
+    "'{}' has no attribute or vertex group '{}'": "„{}“ hat kein Attribut und keine Vertex-Gruppe „{}“",
+    "'{}' is of a type that nodes cannot sample: use Transfer": "„{}“ ist von einem Typ, den Nodes nicht abtasten: stattdessen übertragen",
 }

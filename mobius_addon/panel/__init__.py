@@ -5,6 +5,7 @@ import bpy
 from ..operators.conformal_transfer import MOBIUS_OT_conformal_transfer
 from .fitted import MOBIUS_PT_fitted
 from .last_transfer import MOBIUS_PT_last_transfer
+from .live import MOBIUS_PT_live
 from .main import MOBIUS_PT_main
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
@@ -26,6 +27,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
         MOBIUS_PT_transfer,
         MOBIUS_PT_last_transfer,
         MOBIUS_PT_transfer_settings,
+        MOBIUS_PT_live,
         MOBIUS_PT_fitted,
         MOBIUS_PT_scans,
         MOBIUS_PT_alignment,
