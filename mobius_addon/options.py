@@ -62,6 +62,16 @@ def outer_vertex(obj: bpy.types.Object, surface: Surface, options: Any) -> int |
     return selected_loop(surface.mesh, selected, repair(options), surface.keys)
 
 
+def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
+    """Return what suggests names for a mask of the scene's source or target."""
+
+    def suggest(_owner: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+        obj = getattr(context.scene.mobius, role)
+        return [] if obj is None or obj.type != "MESH" else mask_names(obj)
+
+    return suggest
+
+
 class AlignOptions:
     """Mixin with the options of an alignment, named as in `solver.AlignSettings`, and where landmarks come from."""
 
@@ -94,6 +104,20 @@ class AlignOptions:
             ("groups", "Vertex Groups", "Vertex groups of equal names with a single vertex on either mesh"),
         ),
         default="none",
+    )
+    source_cut: bpy.props.StringProperty(
+        name="Cut Source To",
+        description="Vertex group or attribute around the piece of the source that is matched, such as a head; empty: "
+        "all of it, or where a body is too deep for a disc the piece that fits",
+        search=_nameable("source"),
+        search_options={"SUGGESTION"},
+    )
+    target_cut: bpy.props.StringProperty(
+        name="Cut Target To",
+        description="Vertex group or attribute around the piece of the target that is matched, such as a head; empty: "
+        "all of it, or where a body is too deep for a disc the piece that fits",
+        search=_nameable("target"),
+        search_options={"SUGGESTION"},
     )
     samples: bpy.props.IntProperty(
         name="Samples",
@@ -132,6 +156,9 @@ class AlignOptions:
 
 ALIGN_OPTIONS = tuple(AlignOptions.__annotations__)
 
+OF_SCENE = ("landmarks", "source_cut", "target_cut")
+"""Those that name something of a scene, which no preset knows and the solver is told as numbers."""
+
 
 def align_settings(
     options: Any, time_limit: float, outer: tuple[int | None, int | None] = (None, None)
@@ -140,7 +167,7 @@ def align_settings(
 
     A radius or time limit of 0 is none; `outer` are vertices on the outer loops of source and target.
     """
-    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name != "landmarks"}
+    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name not in OF_SCENE}
     chosen |= {"radius": options.radius or None, "time_limit": time_limit or None}
     return AlignSettings(**chosen, fill_holes=options.fill_holes, source_outer=outer[0], target_outer=outer[1])
 
@@ -148,16 +175,6 @@ def align_settings(
 def enum_identifier(kind: str) -> str:
     """Return how Blender's enumerations spell a kind of data: 'vertex-groups' is 'VERTEX_GROUPS'."""
     return kind.upper().replace("-", "_")
-
-
-def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
-    """Return what suggests names for a mask of the scene's source or target."""
-
-    def suggest(_owner: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-        obj = getattr(context.scene.mobius, role)
-        return [] if obj is None or obj.type != "MESH" else mask_names(obj)
-
-    return suggest
 
 
 _TRANSFER = TransferSettings()
