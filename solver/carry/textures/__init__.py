@@ -1,0 +1,36 @@
+"""Pictures carried from surface to surface, texel by texel: no rays, no cage, no common pose.
+
+Each texel of the target's UV layout lies in one of its triangles; the correspondence takes the triangle's corners to the
+source, the point between them is looked for on the source's surface next to these, and the source's picture is read
+there, at the source's own UV.
+"""
+
+from .carrying import Carrying
+from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
+from .normal_maps import FLAT, TangentFrames, TurnedNormals
+from .paints import FromCorners, FromPictures, Paint
+from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
+from .resample import Resampled, Wanted, at_vertices, resample
+
+__all__ = [
+    "CLIP",
+    "EXTEND",
+    "FLAT",
+    "REPEAT",
+    "Carrying",
+    "FromCorners",
+    "FromPictures",
+    "LayoutError",
+    "Paint",
+    "Picture",
+    "Resampled",
+    "TangentFrames",
+    "TurnedNormals",
+    "Wanted",
+    "at_vertices",
+    "encoded",
+    "island_numbers",
+    "picture_size",
+    "place_in_tiles",
+    "resample",
+]

@@ -1,0 +1,173 @@
+"""Pictures for the target, band by band, so that no array but the pictures themselves has all their texels."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...surface.mesh import Booleans, Floats
+from .carrying import Carrying
+from .inner_loops import inner_loops
+from .layout import in_texels
+from .margins import Margin
+from .paints import Paint, Texels, Values, at_corners
+from .picture import Pixels
+from .reference import TEXEL
+
+BAND = 1 << 18
+"""Texels worked on at once by a thread: 10 MB of them, and some ten calls a second."""
+
+MOST_THREADS = 8
+"""Of these each has a band in memory."""
+
+Store = Callable[[Values], Pixels]
+"""Turns values, (n, channels), into what the picture keeps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """A picture to be made.
+
+    Attributes
+    ----------
+    paint : Paint
+    store : callable
+        Turns values into pixels; `numpy.asarray` keeps them.
+    gaps : (n, channels) float64 or None
+        Values at the target's vertices for triangles without a counterpart, linear in between; None: they stay 0.
+    """
+
+    paint: Paint
+    store: Store
+    gaps: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Resampled:
+    """Pictures of one size, in one tile of the target's layout.
+
+    Attributes
+    ----------
+    pixels : tuple of (height, width, channels) arrays
+    known : (height, width) bool
+        Texels in triangles that have a counterpart.
+    covered : (height, width) bool
+        Texels in triangles that have been given a value, the margin not among them.
+    overlaps : int
+        Texels in which triangles of the target overlap; there the first is shown.
+    """
+
+    pixels: tuple[Pixels, ...]
+    known: Booleans
+    covered: Booleans
+    overlaps: int
+
+
+def resample(
+    carrying: Carrying,
+    corners: Floats,
+    size: tuple[int, int],
+    wanted: Sequence[Wanted],
+    *,
+    margin: int = 0,
+    progress: Callable[[float], None] | None = None,
+    threads: int | None = None,
+) -> Resampled:
+    """Make pictures for a layout of the target.
+
+    Parameters
+    ----------
+    carrying : Carrying
+    corners : (m, 3, 2) float64
+        The target's layout; (0, 0) to (1, 1) is the picture. nan where a triangle is in another one.
+    size : (int, int)
+        Height and width.
+    wanted : sequence of Wanted
+    margin : int
+        Width in texels of what is added around the islands.
+    progress : callable, optional
+        Called with the share of the work done, in [0, 1]; may raise to end it.
+    threads : int, optional
+        By default as many as there are processors, up to `MOST_THREADS`.
+    """
+    height, width = size
+    layout = in_texels(corners, width, height)
+    known, covered = np.zeros(size, bool), np.zeros(size, bool)
+    pixels = [
+        np.zeros((height, width, x.paint.channels), x.store(np.zeros((1, x.paint.channels), np.float32)).dtype)
+        for x in wanted
+    ]
+    rows = max(1, BAND // width)
+    count = threads or min(os.cpu_count() or 1, MOST_THREADS)
+    # what all bands share is found once, before there are threads
+    _ = carrying.place, carrying.normal, carrying.beyond, carrying.known
+
+    def band(first: int) -> int:
+        some = slice(first, min(first + rows, height))
+        texels, overlaps = inner_loops().texels(carrying, layout, first, some.stop - first, width)
+        known[some] = texels["face"] >= 0
+        covered[some] = known[some]
+        flat = texels.reshape(-1)
+        own = np.flatnonzero(flat["triangle"] >= 0)
+        flat = flat[own]
+        if len(flat):
+            for want, picture in zip(wanted, pixels, strict=True):
+                target = picture[some].reshape(-1, want.paint.channels)
+                _fill(carrying, want, flat, own, target, covered[some].reshape(-1))
+        return overlaps
+
+    overlaps, done = 0, 0
+    firsts = range(0, height, rows)
+    pool = ThreadPoolExecutor(count)
+    try:
+        for future in as_completed([pool.submit(band, first) for first in firsts]):
+            overlaps += future.result()
+            done += 1
+            if progress is not None:
+                progress(done / len(firsts))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    if margin:
+        around = Margin.of(covered, margin)
+        for picture in pixels:
+            around.fill(picture)
+    return Resampled(tuple(pixels), known, covered, overlaps)
+
+
+def _fill(
+    carrying: Carrying, want: Wanted, texels: Texels, own: Any, target: Pixels, covered: Booleans
+) -> None:
+    """Give texels, (k,), which are those numbered `own` of a band, their pixels."""
+    values = np.zeros((len(texels), want.paint.channels), np.float32)
+    want.paint(texels, values)
+    bare = np.flatnonzero(texels["face"] < 0)
+    if len(bare) and want.gaps is not None:
+        at = want.gaps[carrying.target.faces[texels["triangle"][bare]]]
+        weights = texels["corner"][bare]
+        values[bare] = at[:, 0] + weights[:, :1] * (at[:, 1] - at[:, 0]) + weights[:, 1:] * (at[:, 2] - at[:, 0])
+        covered[own[bare]] = True
+    elif len(bare):
+        kept = np.flatnonzero(texels["face"] >= 0)
+        own, values = own[kept], values[kept]
+    if len(own):
+        target[own] = want.store(values)
+
+
+def at_vertices(carrying: Carrying, paint: Paint) -> Floats:
+    """Return what a paint gives the target's vertices, (n, channels), each a point; 0 where there is no counterpart."""
+    texels = np.zeros(len(carrying.at), TEXEL)
+    texels["face"] = carrying.at
+    texels["place"] = carrying.correspondence.barycentric[:, 1:]
+    values = np.zeros((len(texels), paint.channels), np.float32)
+    paint(texels, values)
+    return values.astype(np.float64)
+
+
+def in_target(values: Floats, texels: Texels) -> Values:
+    """Return values at texels, (k, d), from values at the corners of the target's triangles, (m, 3, d)."""
+    return at_corners(values, texels["triangle"], texels["corner"])
