@@ -1,16 +1,18 @@
 """Pictures carried from surface to surface, texel by texel: no rays, no cage, no common pose.
 
-Each texel of the target's UV layout lies in one of its triangles; the correspondence takes the triangle's corners to the
-source, the point between them is looked for on the source's surface next to these, and the source's picture is read
-there, at the source's own UV.
+Each texel of the target's UV layout lies in one of its triangles; the correspondence takes the triangle's corners to
+the source, the point between them is looked for on the source's surface next to these, and the source's picture is
+read there, at the source's own UV.
 """
 
 from .carrying import Carrying
+from .exr import exr_bytes
 from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
 from .normal_maps import FLAT, TangentFrames, TurnedNormals
 from .paints import FromCorners, FromPictures, Paint
 from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
-from .resample import Resampled, Wanted, at_vertices, resample
+from .resample import Finder, InLayout, Resampled, Wanted, at_vertices, resample
+from .transfer_map import MapPaint, TransferMap
 
 __all__ = [
     "CLIP",
@@ -18,17 +20,22 @@ __all__ = [
     "FLAT",
     "REPEAT",
     "Carrying",
+    "Finder",
     "FromCorners",
     "FromPictures",
+    "InLayout",
     "LayoutError",
+    "MapPaint",
     "Paint",
     "Picture",
     "Resampled",
     "TangentFrames",
+    "TransferMap",
     "TurnedNormals",
     "Wanted",
     "at_vertices",
     "encoded",
+    "exr_bytes",
     "island_numbers",
     "picture_size",
     "place_in_tiles",

@@ -90,7 +90,9 @@ def sample(
     out: npt.NDArray[np.float32],
 ) -> None:
     """Do what `reference.sample` does."""
-    assert out.dtype == np.float32 and out.flags.c_contiguous and given.flags.c_contiguous
+    assert out.dtype == np.float32
+    assert out.flags.c_contiguous
+    assert given.flags.c_contiguous
     pixels = np.ascontiguousarray(picture.pixels)
     page, corners = np.ascontiguousarray(page, np.int32), np.ascontiguousarray(corners, np.float64)
     table = None if picture.table is None else np.ascontiguousarray(picture.table, np.float32)

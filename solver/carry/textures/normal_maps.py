@@ -83,7 +83,9 @@ class TurnedNormals:
             aside += amount * _unit(laid - _dot(laid, own_normal) * own_normal)
         result = np.concatenate([_dot(aside, own_tangent), _dot(aside, own_bitangent), given[:, 2:]], axis=1)
         length = np.linalg.norm(result, axis=1, keepdims=True)
-        result = np.divide(result, length, out=np.tile(np.float32([0, 0, 1]), (len(result), 1)), where=length > 1e-6)
+        result = np.divide(
+            result, length, out=np.tile(np.array([0, 0, 1], np.float32), (len(result), 1)), where=length > 1e-6
+        )
         out[rows] = 0.5 * result + 0.5
 
 

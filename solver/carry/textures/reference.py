@@ -298,10 +298,10 @@ def islands(
     label: npt.NDArray[np.uint16],
     parent: npt.NDArray[np.uint16],
 ) -> None:
-    """Label the texels of a picture, (height, width), by the islands of the faces on the wanted page.
+    """Label the texels of a picture, (height, width), whose middle is in an island of the faces on the wanted page.
 
-    Those whose middle is in an island, then those that one touches. Islands that overlap become one in `parent`,
-    (65536,).
+    Those that it only touches are left out: where nobody has added a margin they are background. Islands that overlap
+    become one in `parent`, (65536,).
     """
     height, width = label.shape
     faces = np.flatnonzero((page == wanted) & (np.ptp(corners, axis=1) < [2 * width, 2 * height]).all(axis=1))
@@ -316,19 +316,17 @@ def islands(
             number = int(parent[number])
         return number
 
-    for touched in (False, True):
-        for triangle, x, y, weights, inside, depth in _touched(own - origin, 0, int(extent[1]), int(extent[0])):
-            column, within = wrapped(x + origin[0], width, 2 if wrap == 1 else wrap)
-            row, above = wrapped(y + origin[1], height, 2 if wrap == 1 else wrap)
-            chosen = np.flatnonzero((inside != touched) & within & above)
-            mine = island[faces[triangle[chosen]]]
-            at = row[chosen] * width + column[chosen]
-            flat = label.reshape(-1)
-            free = np.flatnonzero(flat[at] == 0)
-            first = free[np.unique(at[free], return_index=True)[1]]
-            flat[at[first]] = mine[first]
-            if not touched:
-                deep = (weights[chosen] > depth[chosen]).all(axis=1) & (flat[at] != mine)
-                for pair in np.unique(np.stack([flat[at[deep]], mine[deep]], axis=1), axis=0).tolist():
-                    a, b = sorted(root(number) for number in pair)
-                    parent[b] = a
+    flat = label.reshape(-1)
+    for triangle, x, y, weights, inside, depth in _touched(own - origin, 0, int(extent[1]), int(extent[0])):
+        column, within = wrapped(x + origin[0], width, 2 if wrap == 1 else wrap)
+        row, above = wrapped(y + origin[1], height, 2 if wrap == 1 else wrap)
+        chosen = np.flatnonzero(inside & within & above)
+        mine = island[faces[triangle[chosen]]]
+        at = row[chosen] * width + column[chosen]
+        free = np.flatnonzero(flat[at] == 0)
+        first = free[np.unique(at[free], return_index=True)[1]]
+        flat[at[first]] = mine[first]
+        deep = (weights[chosen] > depth[chosen]).all(axis=1) & (flat[at] != mine)
+        for pair in np.unique(np.stack([flat[at[deep]], mine[deep]], axis=1), axis=0).tolist():
+            a, b = sorted(root(number) for number in pair)
+            parent[b] = a

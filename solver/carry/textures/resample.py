@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
-from ...surface.mesh import Booleans, Floats
+from ...surface.mesh import Booleans, Floats, Integers
 from .carrying import Carrying
 from .inner_loops import inner_loops
 from .layout import in_texels
@@ -38,8 +38,8 @@ class Wanted:
     paint : Paint
     store : callable
         Turns values into pixels; `numpy.asarray` keeps them.
-    gaps : (n, channels) float64 or None
-        Values at the target's vertices for triangles without a counterpart, linear in between; None: they stay 0.
+    gaps : (m, 3, channels) float64 or None
+        Values at the corners of the target's triangles, for those without a counterpart; None: they stay 0.
     """
 
     paint: Paint
@@ -68,9 +68,44 @@ class Resampled:
     overlaps: int
 
 
+class Finder(Protocol):
+    """Finds what texels show."""
+
+    def texels(self, first: int, rows: int) -> tuple[Texels, int]:
+        """Return the texels of some rows, (rows, width) TEXEL, and in how many of them triangles overlap."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class InLayout:
+    """Texels of a picture for a layout of the target.
+
+    Attributes
+    ----------
+    carrying : Carrying
+    corners : (m, 3, 2) float64
+        The target's layout in texels; nan where a triangle is in another picture.
+    width : int
+    """
+
+    carrying: Carrying
+    corners: Floats
+    width: int
+
+    @staticmethod
+    def of(carrying: Carrying, corners: Floats, size: tuple[int, int]) -> InLayout:
+        """Prepare a layout, of which (0, 0) to (1, 1) is the picture, of a height and width."""
+        # what all threads share is found once, before there are any
+        _ = carrying.place, carrying.normal, carrying.beyond, carrying.known
+        return InLayout(carrying, in_texels(corners, size[1], size[0]), size[1])
+
+    def texels(self, first: int, rows: int) -> tuple[Texels, int]:
+        """Return some rows; see `Finder`."""
+        return inner_loops().texels(self.carrying, self.corners, first, rows, self.width)
+
+
 def resample(
-    carrying: Carrying,
-    corners: Floats,
+    finder: Finder,
     size: tuple[int, int],
     wanted: Sequence[Wanted],
     *,
@@ -78,13 +113,11 @@ def resample(
     progress: Callable[[float], None] | None = None,
     threads: int | None = None,
 ) -> Resampled:
-    """Make pictures for a layout of the target.
+    """Make pictures.
 
     Parameters
     ----------
-    carrying : Carrying
-    corners : (m, 3, 2) float64
-        The target's layout; (0, 0) to (1, 1) is the picture. nan where a triangle is in another one.
+    finder : Finder
     size : (int, int)
         Height and width.
     wanted : sequence of Wanted
@@ -96,7 +129,6 @@ def resample(
         By default as many as there are processors, up to `MOST_THREADS`.
     """
     height, width = size
-    layout = in_texels(corners, width, height)
     known, covered = np.zeros(size, bool), np.zeros(size, bool)
     pixels = [
         np.zeros((height, width, x.paint.channels), x.store(np.zeros((1, x.paint.channels), np.float32)).dtype)
@@ -104,12 +136,10 @@ def resample(
     ]
     rows = max(1, BAND // width)
     count = threads or min(os.cpu_count() or 1, MOST_THREADS)
-    # what all bands share is found once, before there are threads
-    _ = carrying.place, carrying.normal, carrying.beyond, carrying.known
 
     def band(first: int) -> int:
         some = slice(first, min(first + rows, height))
-        texels, overlaps = inner_loops().texels(carrying, layout, first, some.stop - first, width)
+        texels, overlaps = finder.texels(first, some.stop - first)
         known[some] = texels["face"] >= 0
         covered[some] = known[some]
         flat = texels.reshape(-1)
@@ -118,7 +148,7 @@ def resample(
         if len(flat):
             for want, picture in zip(wanted, pixels, strict=True):
                 target = picture[some].reshape(-1, want.paint.channels)
-                _fill(carrying, want, flat, own, target, covered[some].reshape(-1))
+                _fill(want, flat, own, target, covered[some].reshape(-1))
         return overlaps
 
     overlaps, done = 0, 0
@@ -139,17 +169,13 @@ def resample(
     return Resampled(tuple(pixels), known, covered, overlaps)
 
 
-def _fill(
-    carrying: Carrying, want: Wanted, texels: Texels, own: Any, target: Pixels, covered: Booleans
-) -> None:
+def _fill(want: Wanted, texels: Texels, own: Integers, target: Pixels, covered: Booleans) -> None:
     """Give texels, (k,), which are those numbered `own` of a band, their pixels."""
     values = np.zeros((len(texels), want.paint.channels), np.float32)
     want.paint(texels, values)
     bare = np.flatnonzero(texels["face"] < 0)
     if len(bare) and want.gaps is not None:
-        at = want.gaps[carrying.target.faces[texels["triangle"][bare]]]
-        weights = texels["corner"][bare]
-        values[bare] = at[:, 0] + weights[:, :1] * (at[:, 1] - at[:, 0]) + weights[:, 1:] * (at[:, 2] - at[:, 0])
+        values[bare] = at_corners(want.gaps, texels["triangle"][bare], texels["corner"][bare])
         covered[own[bare]] = True
     elif len(bare):
         kept = np.flatnonzero(texels["face"] >= 0)
@@ -166,8 +192,3 @@ def at_vertices(carrying: Carrying, paint: Paint) -> Floats:
     values = np.zeros((len(texels), paint.channels), np.float32)
     paint(texels, values)
     return values.astype(np.float64)
-
-
-def in_target(values: Floats, texels: Texels) -> Values:
-    """Return values at texels, (k, d), from values at the corners of the target's triangles, (m, 3, d)."""
-    return at_corners(values, texels["triangle"], texels["corner"])

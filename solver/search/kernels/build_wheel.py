@@ -75,7 +75,11 @@ def compile_library(target: Platform, processor: str, output: Path) -> None:
         command.append("-fPIC")
     if target.ending == "dylib":
         command.append(f"-Wl,-install_name,@rpath/{output.name}")  # else the folder it was compiled in
-    done = subprocess.run([*command, *(str(HERE / source) for source in SOURCES), "-lm", "-o", str(output)], capture_output=True, text=True)
+    done = subprocess.run(
+        [*command, *(str(HERE / source) for source in SOURCES), "-lm", "-o", str(output)],
+        capture_output=True,
+        text=True,
+    )
     if done.returncode:
         raise SystemExit(f"compiling the kernels for {target.tag} failed:\n{done.stderr}")
 

@@ -304,33 +304,31 @@ static uint16_t root(const uint16_t *parent, uint16_t i) {
     return i;
 }
 
-/* Labels the texels of a picture by the islands of a layout: those whose middle is in one, then those that it touches.
-   Islands that overlap become one in `parent`, (65536,). */
+/* Labels the texels of a picture whose middle is in an island of a layout. Islands that overlap become one in
+   `parent`, (65536,). */
 EXPORT void mobius_islands(int64_t faces, const double *corner, const int32_t *page, int64_t wanted,
                            const uint16_t *island, int64_t width, int64_t height, int64_t wrap, uint16_t *label,
                            uint16_t *parent) {
-    for (int touched = 0; touched < 2; touched++)
-        for (int64_t k = 0; k < faces; k++) {
-            Flat t;
-            if (page[k] != wanted || !flat(corner + 6 * k, &t)) continue;
-            if (t.right - t.left > 2 * width || t.bottom - t.top > 2 * height) continue;
-            for (int64_t y = t.top; y <= t.bottom; y++) {
-                int64_t row = wrapped(y, height, wrap == 1 ? 2 : wrap);
-                if (row < 0) continue;
-                for (int64_t x = t.left; x <= t.right; x++) {
-                    double w[3];
-                    int how = touches(&t, (double)x, (double)y, w);
-                    if (how != 2 - touched) continue;
-                    int64_t column = wrapped(x, width, wrap == 1 ? 2 : wrap);
-                    if (column < 0) continue;
-                    uint16_t *own = label + row * width + column;
-                    if (!*own) *own = island[k];
-                    else if (!touched && *own != island[k] && w[0] > t.depth[0] && w[1] > t.depth[1] && w[2] > t.depth[2]) {
-                        uint16_t a = root(parent, *own), b = root(parent, island[k]);
-                        if (a < b) parent[b] = a;
-                        else parent[a] = b;
-                    }
+    for (int64_t k = 0; k < faces; k++) {
+        Flat t;
+        if (page[k] != wanted || !flat(corner + 6 * k, &t)) continue;
+        if (t.right - t.left > 2 * width || t.bottom - t.top > 2 * height) continue;
+        for (int64_t y = t.top; y <= t.bottom; y++) {
+            int64_t row = wrapped(y, height, wrap == 1 ? 2 : wrap);
+            if (row < 0) continue;
+            for (int64_t x = t.left; x <= t.right; x++) {
+                double w[3];
+                if (touches(&t, (double)x, (double)y, w) != 2) continue;
+                int64_t column = wrapped(x, width, wrap == 1 ? 2 : wrap);
+                if (column < 0) continue;
+                uint16_t *own = label + row * width + column;
+                if (!*own) *own = island[k];
+                else if (*own != island[k] && w[0] > t.depth[0] && w[1] > t.depth[1] && w[2] > t.depth[2]) {
+                    uint16_t a = root(parent, *own), b = root(parent, island[k]);
+                    if (a < b) parent[b] = a;
+                    else parent[a] = b;
                 }
             }
         }
+    }
 }
