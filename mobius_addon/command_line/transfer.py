@@ -12,7 +12,7 @@ from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
 from .pair import align_pair, opened_pair, read_pair
 from .several_targets import one_by_one
-from .transfer_options import add_transfer_options, transfer_settings
+from .transfer_options import add_texture_options, add_transfer_options, transfer_settings
 
 if TYPE_CHECKING:
     from ...solver import Correspondence
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     add_transfer_options(parser.add_argument_group("transfer"))
+    add_texture_options(parser.add_argument_group("textures"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,12 +67,15 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
     from ...solver import load_map, report, save_map
     from ..files import Unreadable, outputs, write_mesh
+    from ..files.pictures_beside import write_map, write_pictures
     from ..operators.transfer import describe_counts, read_through
 
     choices = transfer_settings(options)
     settings = align_settings(options)
     if options.use_map and (options.map or options.report):
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    if options.texture_map and "textures" not in choices.kinds:
+        raise Unreadable("--texture-map is made with textures: say --only textures")
     _require_writable(options)
     alignment = None
     with opened_pair(options, write=True) as (source, target, notes):
@@ -80,11 +84,17 @@ def _transfer_to(options: argparse.Namespace) -> None:
             correspondence = _fitting_map(load_map, options, surfaces)
         else:
             alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
-        plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
+        keeps = options.texture_map is not None
+        reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
+        plan = reading.carry()
         plan.write(target.obj)
         order = orders(options.map, (source, target))
     with outputs() as written:
         backup = is_input(options.output, [options.source, options.target])
+        if options.texture_map:
+            write_map(plan.textures, options.texture_map, written)
+        if plan.textures is not None and not options.pack_textures:
+            write_pictures(target.obj, options.output, written)
         lost = write_mesh(target.obj, options.output, written, backup=backup)
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
@@ -100,7 +110,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
 def _require_writable(options: argparse.Namespace) -> None:
     inputs = [options.source, options.target, options.use_map, options.landmarks]
-    others = [options.map, options.report]
+    others = [options.map, options.report, options.texture_map]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 
 
@@ -122,4 +132,6 @@ def _fitting_map(
 
 
 def _listed(plan: Transfer) -> list[dict[str, str]]:
-    return [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]
+    listed = [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]
+    made = () if plan.textures is None else plan.textures.made
+    return listed + [{"kind": "textures", "source": x.channel.label, "target": x.channel.label} for x in made]

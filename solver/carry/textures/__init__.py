@@ -9,7 +9,7 @@ from .carrying import Carrying
 from .exr import exr_bytes
 from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
 from .normal_maps import FLAT, TangentFrames, TurnedNormals
-from .paints import FromCorners, FromPictures, Paint
+from .paints import FromCorners, FromPictures, OnTarget, Paint, Stacked, Together
 from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
 from .resample import Finder, InLayout, Resampled, Wanted, at_vertices, resample
 from .transfer_map import MapPaint, TransferMap
@@ -26,10 +26,13 @@ __all__ = [
     "InLayout",
     "LayoutError",
     "MapPaint",
+    "OnTarget",
     "Paint",
     "Picture",
     "Resampled",
+    "Stacked",
     "TangentFrames",
+    "Together",
     "TransferMap",
     "TurnedNormals",
     "Wanted",

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ...surface.mesh import Floats, Integers
+from ...surface.mesh import Booleans, Floats, Integers
 from .inner_loops import inner_loops
 from .layout import in_texels
 from .picture import Picture, merged
@@ -78,7 +78,7 @@ class FromPictures:
         pictures: Sequence[Picture | Floats],
         corners: Sequence[Floats],
         page: Integers,
-        island: npt.NDArray[np.uint16],
+        island: Sequence[npt.NDArray[np.uint16]],
         channels: int,
     ) -> FromPictures:
         """Label the pictures by the islands of the faces that show them.
@@ -90,21 +90,21 @@ class FromPictures:
         corners : sequence of (f, 3, 2) float64
             The UVs of the source's faces on each, (0, 0) to (1, 1) being the picture.
         page : (f,) int
-        island : (f,) uint16
-            Numbers from 1; those that overlap in a picture count as one there.
+        island : sequence of (f,) uint16
+            For each page numbers from 1; those that overlap in its picture count as one there.
         channels : int
         """
         pages = []
-        for number, (picture, uv) in enumerate(zip(pictures, corners, strict=True)):
+        for number, (picture, uv, own) in enumerate(zip(pictures, corners, island, strict=True)):
             if not isinstance(picture, Picture):
-                pages.append(Page(None, np.asarray(picture, np.float32), np.zeros((0, 3, 2)), island))
+                pages.append(Page(None, np.asarray(picture, np.float32), np.zeros((0, 3, 2)), own))
                 continue
             height, width = picture.pixels.shape[:2]
             at = in_texels(uv, width, height)
             label, parent = np.zeros((height, width), np.uint16), np.arange(1 << 16).astype(np.uint16)
-            inner_loops().islands(at, page, number, island, picture.wrap, label, parent)
+            inner_loops().islands(at, page, number, own, picture.wrap, label, parent)
             one = merged(label, parent)
-            pages.append(Page(replace(picture, label=label), np.zeros(0, np.float32), at, one[island]))
+            pages.append(Page(replace(picture, label=label), np.zeros(0, np.float32), at, one[own]))
         return FromPictures(tuple(pages), page, channels)
 
     def __call__(self, texels: Texels, out: Values) -> None:
@@ -118,7 +118,31 @@ class FromPictures:
 
 @dataclass(frozen=True, eq=False)
 class FromCorners:
-    """Values at the corners of the source's faces, (f, 3, channels), linear in between."""
+    """Values at the corners of the source's faces, (f, 3, channels), linear in between.
+
+    `faces`, (f,), are those that it is about; None: all.
+    """
+
+    values: Floats
+    faces: Booleans | None = None
+
+    @property
+    def channels(self) -> int:
+        """How many numbers a corner has."""
+        return self.values.shape[2]
+
+    def __call__(self, texels: Texels, out: Values) -> None:
+        """Write the mean of each face's corners; see `Paint`."""
+        chosen = texels["face"] >= 0
+        if self.faces is not None:
+            chosen &= self.faces[texels["face"]]
+        rows = np.flatnonzero(chosen)
+        out[rows] = at_corners(self.values, texels["face"][rows], texels["place"][rows])
+
+
+@dataclass(frozen=True, eq=False)
+class OnTarget:
+    """Values at the corners of the target's triangles, (m, 3, channels), linear in between."""
 
     values: Floats
 
@@ -128,9 +152,46 @@ class FromCorners:
         return self.values.shape[2]
 
     def __call__(self, texels: Texels, out: Values) -> None:
-        """Write the mean of each face's corners; see `Paint`."""
-        rows = np.flatnonzero(texels["face"] >= 0)
-        out[rows] = at_corners(self.values, texels["face"][rows], texels["place"][rows])
+        """Write the mean of each triangle's corners; see `Paint`."""
+        out[:] = at_corners(self.values, texels["triangle"], texels["corner"])
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Several paints, each for faces of its own."""
+
+    paints: tuple[Paint, ...]
+
+    @property
+    def channels(self) -> int:
+        """How many numbers each of them gives."""
+        return self.paints[0].channels
+
+    def __call__(self, texels: Texels, out: Values) -> None:
+        """Write what all of them give; see `Paint`."""
+        for paint in self.paints:
+            paint(texels, out)
+
+
+@dataclass(frozen=True, eq=False)
+class Stacked:
+    """The channels of several paints, one after the other."""
+
+    paints: tuple[Paint, ...]
+
+    @property
+    def channels(self) -> int:
+        """How many numbers they give together."""
+        return sum(paint.channels for paint in self.paints)
+
+    def __call__(self, texels: Texels, out: Values) -> None:
+        """Write what each of them gives; see `Paint`."""
+        first = 0
+        for paint in self.paints:
+            own = np.zeros((len(texels), paint.channels), np.float32)
+            paint(texels, own)
+            out[:, first : first + paint.channels] = own
+            first += paint.channels
 
 
 def at_corners(values: Floats, face: Integers, place: Values) -> Values:

@@ -58,6 +58,8 @@ class Resampled:
         Texels in triangles that have a counterpart.
     covered : (height, width) bool
         Texels in triangles that have been given a value, the margin not among them.
+    bare : (height, width) bool
+        Texels in triangles that have no counterpart.
     overlaps : int
         Texels in which triangles of the target overlap; there the first is shown.
     """
@@ -65,6 +67,7 @@ class Resampled:
     pixels: tuple[Pixels, ...]
     known: Booleans
     covered: Booleans
+    bare: Booleans
     overlaps: int
 
 
@@ -129,7 +132,7 @@ def resample(
         By default as many as there are processors, up to `MOST_THREADS`.
     """
     height, width = size
-    known, covered = np.zeros(size, bool), np.zeros(size, bool)
+    known, covered, bare = (np.zeros(size, bool) for _ in range(3))
     pixels = [
         np.zeros((height, width, x.paint.channels), x.store(np.zeros((1, x.paint.channels), np.float32)).dtype)
         for x in wanted
@@ -142,6 +145,7 @@ def resample(
         texels, overlaps = finder.texels(first, some.stop - first)
         known[some] = texels["face"] >= 0
         covered[some] = known[some]
+        bare[some] = (texels["triangle"] >= 0) & ~known[some]
         flat = texels.reshape(-1)
         own = np.flatnonzero(flat["triangle"] >= 0)
         flat = flat[own]
@@ -166,7 +170,7 @@ def resample(
         around = Margin.of(covered, margin)
         for picture in pixels:
             around.fill(picture)
-    return Resampled(tuple(pixels), known, covered, overlaps)
+    return Resampled(tuple(pixels), known, covered, bare, overlaps)
 
 
 def _fill(want: Wanted, texels: Texels, own: Integers, target: Pixels, covered: Booleans) -> None:

@@ -56,7 +56,7 @@ def psnr(error: np.ndarray) -> float:
 def pictures(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, **options: bool) -> FromPictures:
     island = island_numbers(mesh.faces, uv)
     return FromPictures.of(
-        [Picture.of(pixels, **options)], [uv], np.zeros(len(uv), int), island, pixels.shape[2]
+        [Picture.of(pixels, **options)], [uv], np.zeros(len(uv), int), [island], pixels.shape[2]
     )  # fmt: skip
 
 
@@ -331,7 +331,7 @@ def test_tiles() -> None:
     assert tiles.tolist() == [1001, 1013, 0]
     assert np.allclose(local[1], corners[1] - [2, 1])
     for wrong, words in (
-        (corners + [0.5, 0], "2 faces across the border"),
+        (corners + np.array([0.5, 0]), "2 faces across the border"),
         (corners - [1, 0], "1 face outside of all tiles"),
         (corners[2:], "has no area: unwrap"),
     ):
