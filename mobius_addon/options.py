@@ -11,6 +11,7 @@ from ..solver import AlignSettings
 from .attributes import KINDS, Mask, TransferSettings, mask_names, split_names
 from .computation import Repair, selected_loop
 from .mesh_data import Surface, foreach
+from .textures.settings import SIZES, TextureSettings
 
 _DEFAULTS = AlignSettings()
 
@@ -161,6 +162,7 @@ def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
 
 
 _TRANSFER = TransferSettings()
+_TEXTURES = TextureSettings()
 _MASK_ITEMS = (
     ("none", "Everything", "Every vertex takes part"),
     ("selected", "Selection", "Vertices that are selected, as chosen in Edit Mode"),
@@ -301,6 +303,46 @@ class TransferOptions(SourceMaskOptions):
         "original mesh. Shape keys are the original's",
         default=_TRANSFER.evaluated,
     )
+    texture_size: bpy.props.IntProperty(
+        name="Size",
+        description="Side of the pictures in texels; 0: as many as the source has on the part that the target shows",
+        default=_TEXTURES.size,
+        min=0,
+        soft_max=8192,
+        max=SIZES[1],
+    )
+    texture_layout: bpy.props.EnumProperty(
+        name="Layout",
+        description="Which UV map the pictures are for",
+        items=(
+            ("auto", "Automatic", "The target's own if it has one, else the source's, else the disc"),
+            ("own", "Own", "The UV map that the target is rendered with"),
+            ("carried", "Carried", "The source's, carried over"),
+            ("disc", "Disc", "The conformal map of the target to a disc"),
+        ),
+        default=_TEXTURES.layout,
+    )
+    texture_margin: bpy.props.IntProperty(
+        name="Margin",
+        description="Texels added around islands; -1: a 256th of the size",
+        default=_TEXTURES.margin,
+        min=-1,
+        soft_max=64,
+    )
+    texture_result: bpy.props.EnumProperty(
+        name="Result",
+        description="What becomes of the pictures",
+        items=(
+            ("pictures", "Pictures", "Pictures in a new material, packed into the file"),
+            ("attributes", "Color Attributes", "What they show at the target's vertices"),
+        ),
+        default=_TEXTURES.result,
+    )
+    texture_mask: bpy.props.BoolProperty(
+        name="Mask of Unmatched",
+        description="A further picture, white where the target has no certain counterpart",
+        default=_TEXTURES.mask,
+    )
 
 
 SOURCE_MASK_OPTIONS = tuple(SourceMaskOptions.__annotations__)
@@ -332,6 +374,11 @@ def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     column.prop(options, "limit")
     column.prop(options, "smallest_weight")
     layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
+    if enum_identifier("textures") in options.kinds:
+        column = layout.column(heading="Textures")
+        column.prop(options, "texture_mask")
+        for name in ("texture_size", "texture_layout", "texture_margin", "texture_result"):
+            column.prop(options, name)
 
 
 def source_mask(options: Any) -> Mask:
@@ -347,4 +394,13 @@ def transfer_settings(options: Any) -> TransferSettings:
     own += ("unmatched", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
-    return TransferSettings(kinds=kinds, names=names, **masks, **{name: getattr(options, name) for name in own})
+    textures = TextureSettings(
+        max(options.texture_size, SIZES[0]) if options.texture_size else 0,
+        options.texture_layout,
+        options.texture_margin,
+        options.texture_result,
+        options.texture_mask,
+    )
+    return TransferSettings(
+        kinds=kinds, names=names, textures=textures, **masks, **{name: getattr(options, name) for name in own}
+    )

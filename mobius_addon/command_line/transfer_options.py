@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def add_transfer_options(group: argparse._ArgumentGroup) -> None:
     """Add the choices of `attributes.TransferSettings`, whose defaults hold where none is given."""
     group.add_argument(
-        "--only", metavar="KIND,...", help="carry these only; one unknown lists all. Textures only where named"
+        "--only", metavar="KIND,...", help="carry these only; one unknown lists all; textures only where named"
     )
     which = group.add_mutually_exclusive_group()
     which.add_argument("--names", metavar="NAME,...", help="carry layers of these names only; * and ? stand for any")

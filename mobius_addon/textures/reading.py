@@ -380,7 +380,8 @@ class _Reader:
                 self._tiles[image] = read_tiles(image)
         width = 3 if channel.color or any(x.part == "RGB" for x in shown.values()) else 1
         floats = any(self._tiles[image][min(self._tiles[image])].dtype != np.uint8 for image in images)
-        space = self._space(channel, images, floats)
+        # alpha is a number whatever the color space of its picture
+        space = DATA if all(x.part == "A" for x in shown.values()) else self._space(channel, images, floats)
         return ChannelPlan(
             channel, self._paint(channel, shown, width, space), space, floats, next(iter(shown.values())).settings
         )
@@ -452,7 +453,7 @@ class _Reader:
             uv = self._mapped(found)
             numbers = island_numbers(self.surface.mesh.faces, uv)
             tiles = self._tiles[found.image]
-            srgb = decoded and found.image.colorspace_settings.name == "sRGB"
+            srgb = decoded and found.part != "A" and found.image.colorspace_settings.name == "sRGB"
             column, row = np.floor(uv.mean(axis=1)).astype(np.intp).T
             tile = FIRST_TILE + column + 10 * row if found.image.source == "TILED" else np.full(len(uv), FIRST_TILE)
             for number, pixels in tiles.items():

@@ -64,11 +64,13 @@ def write_textures(obj: bpy.types.Object, found: Textures, made: list[Any], uv_m
     images = {}
     for one in found.made:
         images[one.channel.identifier] = _image(obj, one.channel.label, one.tiles, one.space, made)
-    for label, tiles in ((MASK, found.mask),):
-        if tiles is not None:
-            _image(obj, label, tiles, DATA, made).use_fake_user = True  # nothing shows it
+    mask = None if found.mask is None else _image(obj, MASK, found.mask, DATA, made)
     if images:
-        _assign(obj, _material(obj, found, images, name, made), found.polygons)
+        material = _material(obj, found, images, name, made)
+        if mask is not None:  # nothing reads it, but it goes where the material goes
+            node = material.node_tree.nodes.new("ShaderNodeTexImage")
+            node.image, node.label, node.location = mask, MASK, (-700, 600)
+        _assign(obj, material, found.polygons)
 
 
 def _layout(obj: bpy.types.Object, found: Textures) -> str:
@@ -97,7 +99,8 @@ def _material(obj: bpy.types.Object, found: Textures, images: dict[str, Any], uv
     material: Any = bpy.data.materials.new(f"{obj.name} Textures")
     made.append(material)
     material[PROPERTY] = obj.name
-    material.use_nodes = True
+    if material.node_tree is None:  # from Blender 5 on every material has one
+        material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")

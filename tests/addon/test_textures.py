@@ -101,7 +101,7 @@ def test_base_color_arrives_turned_as_the_layout_is(sheets: tuple[Any, Any]) -> 
     source, target = sheets
     picture = smooth()
     source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
-    plan = carry(source, target)
+    plan = carry(source, target, size=SIZE)
     assert plan.counts() == {"textures": 1}
     assert plan.warnings == ()
     close(shown(target, "Base Color")[:, :, :3], picture[::-1, ::-1])
@@ -199,7 +199,7 @@ def test_a_target_without_a_layout_gets_one(sheets: tuple[Any, Any], layout: str
         assert [x.name for x in target.data.uv_layers] == ["UVMap", "Disc"]
     target.data.uv_layers.remove(target.data.uv_layers["UVMap"])
     if layout == "carried":
-        carry(source, target)
+        carry(source, target, size=SIZE)
         close(shown(target, "Base Color")[:, :, :3], picture)
     name = "UVMap" if layout == "carried" else "Disc"
     uv = corner_values(target, name)
