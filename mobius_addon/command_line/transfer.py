@@ -16,7 +16,7 @@ from .transfer_options import add_texture_options, add_transfer_options, transfe
 
 if TYPE_CHECKING:
     from ...solver import Correspondence
-    from ..attributes import Transfer
+    from ..attributes import Transfer, TransferSettings
     from ..mesh_data import Surface
 
 HELP = (
@@ -77,6 +77,9 @@ def _transfer_to(options: argparse.Namespace) -> None:
     if options.texture_map and "textures" not in choices.kinds:
         raise Unreadable("--texture-map is made with textures: say --only textures")
     _require_writable(options)
+    if options.use_texture_map:
+        _through_texture_map(options, choices)
+        return
     alignment = None
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
@@ -108,8 +111,34 @@ def _transfer_to(options: argparse.Namespace) -> None:
     say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
 
 
+def _through_texture_map(options: argparse.Namespace, choices: TransferSettings) -> None:
+    """Carry the source's pictures through a transfer map."""
+    from ..attributes import restored_on_failure
+    from ..files import Unreadable, outputs, write_mesh
+    from ..files.pictures_beside import write_pictures
+    from ..operators.transfer import describe_counts
+    from ..textures.by_map import read_map, textures_by_map
+    from ..textures.writing import made_or_removed, write_textures
+
+    if choices.kinds != ("textures",) or options.map or options.report or options.use_map or options.texture_map:
+        raise Unreadable("--use-texture-map carries pictures and aligns nothing: say --only textures, and no other map")
+    with opened_pair(options, write=True) as (source, target, notes):
+        surfaces = read_pair(options, source, target)
+        tiles = read_map(options.use_texture_map)
+        found = textures_by_map(source.obj, target.obj, surfaces, tiles, choices.textures)
+        with made_or_removed() as made, restored_on_failure(target.obj):
+            write_textures(target.obj, found, made)
+    with outputs() as written:
+        if not options.pack_textures:
+            write_pictures(target.obj, options.output, written)
+        backup = is_input(options.output, [options.source, options.target])
+        lost = write_mesh(target.obj, options.output, written, backup=backup)
+    warn([*notes, *found.notes, *lost])
+    say(f"{options.output}: {describe_counts({'textures': len(found.made)})} from {options.source}")
+
+
 def _require_writable(options: argparse.Namespace) -> None:
-    inputs = [options.source, options.target, options.use_map, options.landmarks]
+    inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
     others = [options.map, options.report, options.texture_map]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 

@@ -262,7 +262,7 @@ def read_textures(
         A picture is missing, or a layout cannot be used.
     """
     obj = shown or source
-    reader = _Reader(obj, carrier)
+    reader = TextureReader(obj, carrier)
     plans = reader.plans()
     if not plans and not keeps_map:
         return None
@@ -305,7 +305,7 @@ def read_textures(
     )
 
 
-def _size(reader: _Reader, carrying: Carrying, layout: TargetLayout) -> int:
+def _size(reader: TextureReader, carrying: Carrying, layout: TargetLayout) -> int:
     """Return the side of pictures in which the target has as many texels as the part of the source that it shows."""
     place = carrying.place[carrying.target.faces[carrying.known]]
     shown = 0.5 * np.linalg.norm(np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]), axis=1).sum()
@@ -313,7 +313,7 @@ def _size(reader: _Reader, carrying: Carrying, layout: TargetLayout) -> int:
     return picture_size(density * shown, layout.corners[layout.tile > 0])
 
 
-class _Reader:
+class TextureReader:
     """Reads what a source shows, each picture once."""
 
     def __init__(self, obj: bpy.types.Object, carrier: Carrier) -> None:
@@ -344,6 +344,53 @@ class _Reader:
     def plans(self) -> list[ChannelPlan]:
         """Return the pictures to be made: those that any material shows."""
         return [plan for channel in CHANNELS if (plan := self._plan(channel)) is not None]
+
+    @property
+    def pages(self) -> dict[tuple[int, int], int]:
+        """Number of the page of each material in each tile, for a transfer map; see `by_page`."""
+        tiles = sorted({FIRST_TILE, *(number for tiles in self._tiles.values() for number in tiles)})
+        return {key: k for k, key in enumerate((slot, tile) for slot in self.materials for tile in tiles)}
+
+    def by_page(self, channel: Channel, width: int, space: str) -> Paint:
+        """Return the paint of a channel for the texels of a transfer map, whose faces are `pages`.
+
+        Raises
+        ------
+        Refusal
+            What is shown lies in another UV map than the one that is rendered.
+        """
+        pictures: list[Picture | Floats] = []
+        corners: list[Floats] = []
+        pages = self.pages
+        unit = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        for slot, number in pages:
+            found = self._found.get((slot, channel.identifier))
+            if found is None:
+                pictures.append(np.resize(value_of(self.materials[slot], channel), width))
+                corners.append(np.zeros((0, 3, 2)))
+                continue
+            if found.image is None or found.uv_map not in ("", rendered_uv(self.obj.data)):
+                raise Refusal(
+                    f"{channel.label} of '{self.obj.name}' does not lie in its UV map '{rendered_uv(self.obj.data)}', "
+                    "which a transfer map is for: carry it without one"
+                )
+            tiles = self._tiles[found.image]
+            tile = number if found.image.source == "TILED" else FIRST_TILE
+            if tile not in tiles:
+                pictures.append(np.resize(np.array(channel.value), width))
+                corners.append(np.zeros((0, 3, 2)))
+                continue
+            pictures.append(self._picture(found, tiles[tile], width, space, found.wrap))
+            origin = np.array(divmod(number - FIRST_TILE, 10)[::-1])
+            there = (unit + origin) @ found.matrix[:, :2].T + found.matrix[:, 2]
+            corners.append(np.repeat((there - origin)[None], len(pages), axis=0))
+        every = np.zeros(len(pages), np.uint16)
+        return FromPictures.of(pictures, corners, np.arange(len(pages)), [every] * len(pages), width)
+
+    def _picture(self, found: Found, pixels: Pixels, width: int, space: str, wrap: int) -> Picture:
+        decoded = space in ("sRGB", LINEAR) and found.part != "A"
+        srgb = decoded and found.image.colorspace_settings.name == "sRGB"
+        return Picture.of(_part(pixels, found.part, width), srgb=srgb, wrap=wrap)
 
     def texels(self) -> float:
         """Return the number of texels that the source has on its surface, of its largest picture."""
@@ -436,7 +483,6 @@ class _Reader:
         corners: list[Floats] = []
         islands: list[Any] = []
         others: list[Paint] = []
-        decoded = space in ("sRGB", LINEAR)
         for slot, material in self.materials.items():
             faces = self.slot == slot
             found = shown.get(slot)
@@ -453,7 +499,6 @@ class _Reader:
             uv = self._mapped(found)
             numbers = island_numbers(self.surface.mesh.faces, uv)
             tiles = self._tiles[found.image]
-            srgb = decoded and found.part != "A" and found.image.colorspace_settings.name == "sRGB"
             column, row = np.floor(uv.mean(axis=1)).astype(np.intp).T
             tile = FIRST_TILE + column + 10 * row if found.image.source == "TILED" else np.full(len(uv), FIRST_TILE)
             for number, pixels in tiles.items():
@@ -465,7 +510,7 @@ class _Reader:
                 # what lies within the picture alone does not go on at its other side
                 within = bool((np.abs(there[own] - 0.5) < 0.5 + 1e-6).all())
                 wrap = EXTEND if within else found.wrap
-                pictures.append(Picture.of(_part(pixels, found.part, width), srgb=srgb, wrap=wrap))
+                pictures.append(self._picture(found, pixels, width, space, wrap))
                 corners.append(there)
                 islands.append(numbers)
         return Together((FromPictures.of(pictures, corners, page, islands, width), *others))

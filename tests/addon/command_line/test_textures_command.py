@@ -114,11 +114,20 @@ def test_a_transfer_map_is_kept(painted: Path, capsys: pytest.CaptureFixture[str
         assert values.max() <= 1
     assert (confidence[number == 0] > 0).mean() > 0.9
     # and used for the picture that the source has now
-    assert run(
-        capsys, "transfer", painted / "source.blend", painted / "out.blend", "-o", painted / "again.blend",
-        "--only", "textures", "--use-texture-map", path,
-    )[0] == 0  # fmt: skip
+    through = [
+        "transfer", painted / "source.blend", painted / "out.blend", "-o", painted / "again.blend",
+        "--only", "textures", "--use-texture-map",
+    ]  # fmt: skip
+    status, out, err = run(capsys, *through, path)
+    assert (status, err) == (0, "")
+    assert "matched" not in out
     assert color_of(shown(painted / "again.blend")) == list(COLOR)
+    (painted / "again.blend").unlink()
+    for wrong, words in ((painted / "no.exr", "there is no file"), (painted / "out_textures", "there is no file")):
+        status, _, err = run(capsys, *through, wrong)
+        assert status in (1, 2)
+        assert words in err
+        assert not (painted / "again.blend").exists()
 
 
 def test_nothing_is_written_on_failure(painted: Path, capsys: pytest.CaptureFixture[str]) -> None:
