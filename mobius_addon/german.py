@@ -229,7 +229,7 @@ GERMAN = {
     "Shared Source": "Quelle gemeinsam",
     "Shared Target": "Ziel gemeinsam",
     "Sharp edges, creases and bevel weights": "Scharfe Kanten, Falten und Fasengewichte",
-    "Show copies of source and target beside each other, in one pose, with a pattern carried by the alignment": "Kopien von Quelle und Ziel nebeneinander zeigen, in einer Lage, mit einem von der Ausrichtung übertragenen Muster",
+    "Show copies of source and target beside each other, in one pose, with a pattern or pictures that were carried": "Kopien von Quelle und Ziel nebeneinander zeigen, in einer Lage, mit einem übertragenen Muster oder übertragenen Bildern",
     "Show": "Zeigen",
     "Side by Side": "Nebeneinander",
     "Sizes": "Größen",

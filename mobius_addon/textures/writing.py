@@ -73,6 +73,11 @@ def write_textures(obj: bpy.types.Object, found: Textures, made: list[Any], uv_m
         _assign(obj, material, found.polygons)
 
 
+def has_pictures(obj: bpy.types.Object) -> bool:
+    """Return whether an object shows pictures that a transfer has made."""
+    return any(slot.material is not None and PROPERTY in slot.material for slot in obj.material_slots)
+
+
 def _layout(obj: bpy.types.Object, found: Textures) -> str:
     layout = found.layout
     if layout.new is None:

@@ -41,6 +41,9 @@ from tests.solver.scans import posed  # noqa: E402
 
 SIZE, FINE = 1024, 4096
 TEXELS = 40_000
+REACHES = (0.001, 0.003, 0.01, 0.03)
+"""Cage extrusions, as shares of the diagonal: the bake is given the best of them."""
+
 WAVE = 0.06
 """Of the stripes, as a share of the diagonal: some 30 texels of the picture of 1024."""
 
@@ -201,10 +204,15 @@ def accuracy() -> list[Outcome]:
                 found = correspond(align(read_surface(source).mesh, read_surface(obj).mesh))
                 begun = time.perf_counter()
                 pixels = ours(source, obj, found, SIZE, {})
+                spent = time.perf_counter() - begun
             else:
-                begun = time.perf_counter()
-                pixels = bake(source, obj, SIZE, 0.03 * neutral.diagonal)
-            spent = time.perf_counter() - begun
+                tries = []
+                for reach in REACHES:
+                    begun = time.perf_counter()
+                    pixels = bake(source, obj, SIZE, reach * neutral.diagonal)
+                    spent = time.perf_counter() - begun
+                    tries.append((judged(pixels, uv, target, whole, neutral)[0], spent, pixels))
+                _, spent, pixels = max(tries, key=lambda x: x[0])
             outcomes.append(Outcome(case, method, *judged(pixels, uv, target, whole, neutral), spent, pixels))
             x = outcomes[-1]
             print(f"{x.case:24} {x.method:26} {x.psnr:7.1f} dB {x.wrong:7.2f} % wrong {x.seconds:7.2f} s", flush=True)
