@@ -28,11 +28,16 @@ def write_pictures(obj: bpy.types.Object, final: Path, written: Outputs) -> None
     for image in [x for x in bpy.data.images if x.get(PROPERTY) == obj.name and x.packed_file is not None]:
         contents = {x.tile_number if image.source == "TILED" else 0: x.packed_file.data for x in image.packed_files}
         name = Path(bpy.path.basename(image.filepath))
-        for stem in numbered_stems(name.name.split(".")[0]):
-            pattern = folder / f"{stem}{'.<UDIM>' if image.source == 'TILED' else ''}{name.suffix}"
-            files = {number: Path(tile_path(str(pattern), number or FIRST_TILE)) for number in contents}
-            if all(_is_free(file, contents[number], taken) for number, file in files.items()):
-                break
+        patterns = (
+            folder / f"{stem}{'.<UDIM>' if image.source == 'TILED' else ''}{name.suffix}"
+            for stem in numbered_stems(name.name.split(".")[0])
+        )
+        pattern, files = next(
+            (pattern, files)
+            for pattern in patterns
+            for files in [{number: Path(tile_path(str(pattern), number or FIRST_TILE)) for number in contents}]
+            if all(_is_free(file, contents[number], taken) for number, file in files.items())
+        )
         taken |= set(files.values())
         for number, file in files.items():
             if not file.exists():

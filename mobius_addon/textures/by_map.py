@@ -83,7 +83,7 @@ def textures_by_map(
     wanted = [Wanted(reader.by_page(plan.channel, plan.paint.channels, plan.space), plan.stored) for plan in plans]
     made: list[dict[int, Pixels]] = [{} for _ in plans]
     for number, pixels in tiles.items():
-        size = pixels.shape[:2]
+        size = (pixels.shape[0], pixels.shape[1])
         found = resample(TransferMap(pixels, pages), size, wanted)
         margin = Margin.of(found.covered, size[0] // 256 if settings.margin < 0 else settings.margin)
         for one, picture in zip(made, found.pixels, strict=True):

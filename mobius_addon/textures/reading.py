@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import bpy
 import numpy as np
 
+from ...solver import TriangleMesh
 from ...solver.carry.frames import local_similarities
+from ...solver.carry.in_place import settled
 from ...solver.carry.textures import (
     EXTEND,
     FLAT,
@@ -38,7 +40,7 @@ from ...solver.carry.textures.margins import Margin
 from ...solver.carry.textures.picture import Pixels
 from ...solver.surface.mesh import Floats, Integers, plural
 from ..attributes.carrier import Carrier
-from ..mesh_data import Refusal, foreach
+from ..mesh_data import Refusal, foreach, mirrored
 from .images import FIRST_TILE, read_tiles
 from .layouts import TargetLayout, corner_uv, rendered_uv, tangent_frames, target_layout
 from .nodes import CHANNELS, Channel, Found, found_in, shader_of, value_of
@@ -267,6 +269,8 @@ def read_textures(
     if not plans and not keeps_map:
         return None
     layout = target_layout(obj, target, carrier, settings)
+    meshes = (_in_world(obj, carrier.source.mesh), _in_world(target, carrier.target.mesh))
+    carrier = replace(carrier, correspondence=settled(carrier.correspondence, *meshes))
     carrying = Carrying(carrier.correspondence, carrier.source.mesh, carrier.target.mesh)
     size = settings.size or _size(reader, carrying, layout)
     found = carrier.correspondence
@@ -311,6 +315,12 @@ def _size(reader: TextureReader, carrying: Carrying, layout: TargetLayout) -> in
     shown = 0.5 * np.linalg.norm(np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]), axis=1).sum()
     density = reader.texels() / max(carrying.source.area, 1e-300)
     return picture_size(density * shown, layout.corners[layout.tile > 0])
+
+
+def _in_world(obj: bpy.types.Object, mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh where its object is in the world."""
+    matrix = np.array(obj.matrix_world)
+    return TriangleMesh(mirrored(obj, mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces, mesh.name)
 
 
 class TextureReader:
@@ -442,7 +452,7 @@ class TextureReader:
         if found is not None and found.attribute is not None:
             there = self.obj.data.color_attributes.get(found.attribute or self.obj.data.attributes.default_color_name)
             return found if there is not None else None
-        if found is not None:
+        if found is not None and material is not None:
             name = found.uv_map or rendered_uv(self.obj.data)
             if name not in self.obj.data.uv_layers:
                 what = f"no UV map '{found.uv_map}'" if found.uv_map else "no UV map"

@@ -106,7 +106,7 @@ def _material(obj: bpy.types.Object, found: Textures, images: dict[str, Any], uv
     material[PROPERTY] = obj.name
     if material.node_tree is None:  # from Blender 5 on every material has one
         material.use_nodes = True
-    tree = material.node_tree
+    tree: Any = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     shader = tree.nodes.new("ShaderNodeBsdfPrincipled")

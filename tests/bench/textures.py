@@ -1,6 +1,6 @@
 """Textures against Cycles' bake (Selected to Active), in accuracy and in time.
 
-    uv run --group bench python tests/bench/textures.py [--picture docs/textures.jpg] [--time]
+    uv run --group bench python tests/bench/textures.py [--picture docs/textures.png] [--time]
 
 A face wears a picture of soft stripes in space, so that the color of every point is known, in a layout of many islands
 that Blender makes. It goes to a decimated copy with another layout: once in the same place; once with another
@@ -156,7 +156,21 @@ class Outcome:
     psnr: float
     wrong: float
     seconds: float
-    pixels: np.ndarray
+    picture: np.ndarray
+
+
+def seen(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, side: int = 360) -> np.ndarray:
+    """A surface that wears a picture, from the front, (side, side, 3) bytes: its texels, the nearest on top."""
+    size = len(pixels)
+    finder = InLayout.of(Carrying(on_itself(mesh), mesh, mesh), uv, (size, size))
+    found = resample(finder, (size, size), [Wanted(FromCorners(mesh.vertices[mesh.faces]), np.asarray)])
+    place = found.pixels[0][found.known]
+    order = np.argsort(place[:, 2])
+    low, extent = mesh.vertices.min(axis=0), np.ptp(mesh.vertices[:, :2], axis=0).max()
+    column, row = ((place[order, :2] - low[:2]) / extent * (side - 1)).astype(int).T
+    result = np.full((side, side, 3), 255, np.uint8)
+    result[row, column] = pixels[found.known][order][:, :3]
+    return result
 
 
 def judged(pixels: np.ndarray, uv: np.ndarray, target: TriangleMesh, whole: TriangleMesh, neutral: TriangleMesh) -> Any:
@@ -213,7 +227,8 @@ def accuracy() -> list[Outcome]:
                     spent = time.perf_counter() - begun
                     tries.append((judged(pixels, uv, target, whole, neutral)[0], spent, pixels))
                 _, spent, pixels = max(tries, key=lambda x: x[0])
-            outcomes.append(Outcome(case, method, *judged(pixels, uv, target, whole, neutral), spent, pixels))
+            drawn = seen(pixels, uv, target)
+            outcomes.append(Outcome(case, method, *judged(pixels, uv, target, whole, neutral), spent, drawn))
             x = outcomes[-1]
             print(f"{x.case:24} {x.method:26} {x.psnr:7.1f} dB {x.wrong:7.2f} % wrong {x.seconds:7.2f} s", flush=True)
             if method == "Möbius":
@@ -255,7 +270,7 @@ def times() -> None:
 
 
 def picture(path: Path, outcomes: list[Outcome]) -> None:
-    """Draw the pictures that each method made."""
+    """Draw the target with the picture that each method made."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -263,16 +278,16 @@ def picture(path: Path, outcomes: list[Outcome]) -> None:
 
     figure, axes = plt.subplots(1, len(outcomes), figsize=(2.6 * len(outcomes), 3), layout="constrained")
     for ax, x in zip(axes, outcomes, strict=True):
-        ax.imshow(x.pixels[: SIZE // 2 : 2, : SIZE // 2 : 2, :3], origin="lower", interpolation="nearest")
+        ax.imshow(x.picture, origin="lower", interpolation="nearest")
         ax.axis("off")
         ax.set_title(f"{x.case}\n{x.method}\n{x.psnr:.1f} dB", fontsize=8)
-    figure.savefig(path, dpi=90, pil_kwargs={"quality": 80} if path.suffix == ".jpg" else {})
+    figure.savefig(path, dpi=90)
 
 
 def main() -> None:
     """Run what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--picture", type=Path, help="where to draw a quarter of each picture")
+    parser.add_argument("--picture", type=Path, help="where to draw the faces")
     parser.add_argument("--time", action="store_true", help="only measure the time of a fine picture")
     options = parser.parse_args()
     if reason := absent("faces_ict/ict_M_neutral.obj"):

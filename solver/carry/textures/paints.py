@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...surface.mesh import Booleans, Floats, Integers
 from .inner_loops import inner_loops
 from .layout import in_texels
-from .picture import Picture, merged
+from .picture import Picture, merged, with_margin
 
 Texels = npt.NDArray[Any]
 """Texels, (n,), as `reference.TEXEL` lists them."""
@@ -104,6 +104,7 @@ class FromPictures:
             label, parent = np.zeros((height, width), np.uint16), np.arange(1 << 16).astype(np.uint16)
             inner_loops().islands(at, page, number, own, picture.wrap, label, parent)
             one = merged(label, parent)
+            with_margin(label, picture.pixels)
             pages.append(Page(replace(picture, label=label), np.zeros(0, np.float32), at, one[own]))
         return FromPictures(tuple(pages), page, channels)
 
