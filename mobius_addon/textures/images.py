@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...solver.carry.textures import exr_bytes
+from ...solver.carry.textures import exr_bytes, png_bytes
 from ...solver.carry.textures.picture import Pixels
 from ..mesh_data import Refusal
 
@@ -97,10 +97,7 @@ def new_image(name: str, tiles: Mapping[int, Pixels], space: str) -> Any:
     with tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as folder:
         for number, pixels in tiles.items():
             path = Path(folder, f"{stem}.{number}.{ending}" if tiled else f"{stem}.{ending}")
-            if floats:
-                path.write_bytes(exr_bytes(_four(pixels)))
-            else:
-                _save_bytes(pixels, path)
+            path.write_bytes(exr_bytes(_four(pixels)) if floats else png_bytes(pixels))
         first = Path(folder, f"{stem}.{min(tiles)}.{ending}" if tiled else f"{stem}.{ending}")
         image: Any = bpy.data.images.load(str(first), check_existing=False)
         try:
@@ -124,23 +121,7 @@ def new_image(name: str, tiles: Mapping[int, Pixels], space: str) -> Any:
 
 
 def _four(pixels: Pixels) -> Pixels:
-    """Return pixels with red, green, blue and alpha, (height, width, 4), as floats."""
+    """Return pixels of floats with red, green, blue and alpha, (height, width, 4)."""
     result = np.ones((*pixels.shape[:2], 4), np.float32)
     result[:, :, : max(pixels.shape[2], 3)] = pixels  # one channel is grey
-    if pixels.dtype == np.uint8:
-        count = max(pixels.shape[2], 3)
-        result[:, :, :count] /= 255
     return result
-
-
-def _save_bytes(pixels: Pixels, path: Path) -> None:
-    height, width, channels = pixels.shape
-    image: Any = bpy.data.images.new(path.name, width, height, alpha=channels == 4)
-    try:
-        image.colorspace_settings.name = "Non-Color"  # the bytes are what they are
-        image.pixels.foreach_set(_four(pixels).reshape(-1))
-        image.file_format = "PNG"
-        image.filepath_raw = str(path)
-        image.save()
-    finally:
-        bpy.data.images.remove(image)

@@ -97,6 +97,17 @@ def close(found: np.ndarray, wanted: np.ndarray, most: float = 4.0) -> None:
     assert np.percentile(np.abs(found.astype(float) - wanted), 99) < most
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_blender_reads_the_bytes_that_are_written(empty_scene: Any, channels: int) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (131, 70, channels)).astype(np.uint8)
+    pixels[:, :, 3:] = np.maximum(pixels[:, :, 3:], 1)
+    found = read_tiles(new_image("Any", {1001: pixels}, "Non-Color"))[1001]
+    if channels == 4:
+        assert (found == pixels).all()
+    else:
+        assert (found[:, :, :3] == pixels).all()
+
+
 def test_base_color_arrives_turned_as_the_layout_is(sheets: tuple[Any, Any]) -> None:
     source, target = sheets
     picture = smooth()

@@ -11,6 +11,7 @@ from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
 from .normal_maps import FLAT, TangentFrames, TurnedNormals
 from .paints import FromCorners, FromPictures, OnTarget, Paint, Stacked, Together
 from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
+from .png import png_bytes
 from .resample import Finder, InLayout, Resampled, Wanted, at_vertices, resample
 from .transfer_map import MapPaint, TransferMap
 
@@ -42,5 +43,6 @@ __all__ = [
     "island_numbers",
     "picture_size",
     "place_in_tiles",
+    "png_bytes",
     "resample",
 ]
