@@ -49,6 +49,9 @@ def announce(report: Callable[[set[str], str], None], target: bpy.types.Object, 
     layers = [
         (x.row.kind, x.source_name, x.name, float(x.covered.mean()) if len(x.covered) else 1.0) for x in plan.layers
     ]
+    if plan.textures is not None:
+        names = [*(one.channel.label for one in plan.textures.made), *plan.textures.colors]
+        layers += [("textures", name, name, 1.0) for name in names]
     uncertain = plan.unmatched.area if plan.unmatched.outcome == "carry" else 0.0
     about = {"source": source, "layers": layers, "warnings": plan.warnings, "uncertain": uncertain}
     target.data.mobius_transferred = json.dumps(about)

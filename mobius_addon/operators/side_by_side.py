@@ -14,6 +14,7 @@ from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..mesh_data import Refusal, read_surface, seen_positions
 from ..results import pattern_color, read_layout, require_room, write_color
+from ..textures.writing import has_pictures
 from ..usable import why_not_aligned
 
 COLLECTION = "Mobius Side by Side"
@@ -23,7 +24,7 @@ GAP = 0.15
 
 
 class MOBIUS_OT_side_by_side(bpy.types.Operator):
-    """Show copies of source and target beside each other, in one pose, with a pattern carried by the alignment."""
+    """Show copies of source and target beside each other, in one pose, with a pattern or pictures that were carried."""
 
     bl_idname = "mobius.side_by_side"
     bl_label = "Side by Side"
@@ -71,6 +72,8 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
             obj.select_set(obj in copies)
         context.view_layer.objects.active = copies[1]
         viewport.show_colors(context)
+        if has_pictures(target):
+            viewport.show_materials(context)
         viewport.look_at_selected_alone(context, np.concatenate([places[0], posed + right * step]))
         return {"FINISHED"}
 

@@ -99,6 +99,8 @@ def read_through(
     surfaces: tuple[Surface, Surface],
     correspondence: Correspondence,
     settings: TransferSettings,
+    *,
+    keeps_texture_map: bool = False,
 ) -> Reading:
     """Read a source and a target for a transfer through a correspondence between them.
 
@@ -108,7 +110,7 @@ def read_through(
         As `mask_weights`, `evaluated` and `read_transfer`.
     """
     with _seen(source, surfaces[0], settings) as shown:
-        return _read(source, target, surfaces, correspondence, settings, shown)
+        return _read(source, target, surfaces, correspondence, settings, shown, keeps_texture_map)
 
 
 def _seen(
@@ -125,6 +127,7 @@ def _read(
     correspondence: Correspondence,
     settings: TransferSettings,
     shown: Shown | None,
+    keeps_texture_map: bool = False,
 ) -> Reading:
     """Read a source, or what is shown of it, and a target; see `read_through`."""
     own_surface, target_surface = surfaces
@@ -136,7 +139,15 @@ def _read(
 
     if shown is None:
         carrier, unmatched = between(correspondence, own_surface, source)
-        return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
+        return read_transfer(
+            source,
+            target,
+            carrier,
+            settings,
+            influence=influence,
+            unmatched=unmatched,
+            keeps_texture_map=keeps_texture_map,
+        )
     carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
     # shape keys are the original's own, in its own shape
     own = between(correspondence, own_surface, source)[0]
@@ -149,6 +160,7 @@ def _read(
         keys_carrier=own,
         influence=influence,
         unmatched=unmatched,
+        keeps_texture_map=keeps_texture_map,
     )
 
 

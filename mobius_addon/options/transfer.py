@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 
 from ..attributes import KINDS, Mask, TransferSettings, split_names
+from ..textures.settings import SIZES, TextureSettings
 from .names import nameable
 
 
@@ -15,6 +16,7 @@ def enum_identifier(kind: str) -> str:
 
 
 _TRANSFER = TransferSettings()
+_TEXTURES = TextureSettings()
 _MASK_ITEMS = (
     ("none", "Everything", "Every vertex takes part"),
     ("selected", "Selection", "Vertices that are selected, as chosen in Edit Mode"),
@@ -155,6 +157,46 @@ class TransferOptions(SourceMaskOptions):
         "original mesh. Shape keys are the original's",
         default=_TRANSFER.evaluated,
     )
+    texture_size: bpy.props.IntProperty(
+        name="Size",
+        description="Side of the pictures in texels; 0: as many as the source has on the part that the target shows",
+        default=_TEXTURES.size,
+        min=0,
+        soft_max=8192,
+        max=SIZES[1],
+    )
+    texture_layout: bpy.props.EnumProperty(
+        name="Layout",
+        description="Which UV map the pictures are for",
+        items=(
+            ("auto", "Automatic", "The target's own if it has one, else the source's, else the disc"),
+            ("own", "Own", "The UV map that the target is rendered with"),
+            ("carried", "Carried", "The source's, carried over"),
+            ("disc", "Disc", "The conformal map of the target to a disc"),
+        ),
+        default=_TEXTURES.layout,
+    )
+    texture_margin: bpy.props.IntProperty(
+        name="Margin",
+        description="Texels added around islands; -1: a 256th of the size",
+        default=_TEXTURES.margin,
+        min=-1,
+        soft_max=64,
+    )
+    texture_result: bpy.props.EnumProperty(
+        name="Result",
+        description="What becomes of the pictures",
+        items=(
+            ("pictures", "Pictures", "Pictures in a new material, packed into the file"),
+            ("attributes", "Color Attributes", "What they show at the target's vertices"),
+        ),
+        default=_TEXTURES.result,
+    )
+    texture_mask: bpy.props.BoolProperty(
+        name="Mask of Unmatched",
+        description="A further picture, white where the target has no certain counterpart",
+        default=_TEXTURES.mask,
+    )
 
 
 SOURCE_MASK_OPTIONS = tuple(SourceMaskOptions.__annotations__)
@@ -174,4 +216,13 @@ def transfer_settings(options: Any) -> TransferSettings:
     own += ("unmatched", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
-    return TransferSettings(kinds=kinds, names=names, **masks, **{name: getattr(options, name) for name in own})
+    textures = TextureSettings(
+        max(options.texture_size, SIZES[0]) if options.texture_size else 0,
+        options.texture_layout,
+        options.texture_margin,
+        options.texture_result,
+        options.texture_mask,
+    )
+    return TransferSettings(
+        kinds=kinds, names=names, textures=textures, **masks, **{name: getattr(options, name) for name in own}
+    )

@@ -6,6 +6,8 @@ from typing import Any
 
 import bpy
 
+from .transfer import enum_identifier
+
 
 def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     """Draw what of the chosen kinds is carried, how it joins what is there, and where."""
@@ -32,3 +34,8 @@ def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     column.prop(options, "limit")
     column.prop(options, "smallest_weight")
     layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
+    if enum_identifier("textures") in options.kinds:
+        column = layout.column(heading="Textures")
+        column.prop(options, "texture_mask")
+        for name in ("texture_size", "texture_layout", "texture_margin", "texture_result"):
+            column.prop(options, name)
