@@ -69,10 +69,9 @@ def _write_distances(path: Path, collection: Collection) -> None:
 
 def _write_pairs(path: Path, collection: Collection) -> None:
     with _table(path) as rows:
-        rows.writerow(
-            ["source", "target", "value", "upper_bound", "certified", "samples", "reflected", "mean_confidence"]
-            + ["distance", "dense", "cycle_error", "suspect", "seconds", "warnings"]
-        )
+        told = ["distance", "dense", "cycle_error", "suspect", "seconds", "warnings"]
+        proved = ["value", "upper_bound", "certified", "samples", "reflected", "mean_confidence"]
+        rows.writerow(["source", "target", *proved, *told])
         for (a, b), known, error, bad in zip(
             collection.edges, collection.figures, collection.errors, collection.suspects, strict=True
         ):

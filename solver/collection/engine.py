@@ -91,10 +91,12 @@ def completed(tasks: Iterator[tuple[Named, Task]], opened: Open, at_a_time: int)
             if broken:
                 again.extend(running.values())
                 running.clear()
-                executor.shutdown(wait=False, cancel_futures=True)
+                executor.shutdown(wait=False)
                 executor = opened()
     finally:
-        executor.shutdown(wait=False, cancel_futures=True)
+        for future in running:
+            future.cancel()
+        executor.shutdown(wait=False)
 
 
 def _submitted(executor: Executor, task: Task) -> Future[Result]:
