@@ -223,10 +223,11 @@ def read_transfer(
         Nothing to carry.
     """
     read, warnings, locked = [], [], []
+    along_keys = replace(keys_carrier or carrier, keys_by=settings.keys_by)
     for row in ROWS:
         if row.kind in settings.kinds:
             keys = row.kind == "shape-keys"
-            whence, way = (source, keys_carrier or carrier) if keys else (shown_source or source, carrier)
+            whence, way = (source, along_keys) if keys else (shown_source or source, carrier)
             layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
             if keys and not _groups_come_along(settings, shown_source):
                 layers = [limited(layer) for layer in layers]

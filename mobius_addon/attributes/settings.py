@@ -62,6 +62,8 @@ class TransferSettings:
     unmatched : str
         What vertices get that correspond to nothing with certainty: "carry" through the map all the same, "leave" what
         they have, the value of the "nearest" vertex that does, or a smooth "fill" between those.
+    keys_by : str
+        How shape keys get the target's directions and proportions, see `Carrier.keys_by`.
     evaluated : bool
         Read the source as its modifiers and shape keys show it.
     collisions : str
@@ -89,6 +91,7 @@ class TransferSettings:
     source_mask: Mask = field(default_factory=Mask)
     target_mask: Mask = field(default_factory=Mask)
     unmatched: Outcome = "carry"
+    keys_by: Literal["gradients", "frames"] = "gradients"
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"
     textures: TextureSettings = field(default_factory=TextureSettings)

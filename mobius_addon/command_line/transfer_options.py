@@ -46,6 +46,13 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         "nearest matched value, a smooth fill",
     )
     group.add_argument(
+        "--shape-keys-by",
+        dest="keys_by",
+        choices=("gradients", "frames"),
+        help="how shape keys get the target's directions and proportions: by the gradients of the whole deformation "
+        "(default), or vertex by vertex by the frames of the surface",
+    )
+    group.add_argument(
         "--evaluated", action="store_true", help="the source as its modifiers and the mix of its shape keys show it"
     )
 
@@ -98,7 +105,7 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
         given |= {"layers": "named", "names": split_names(options.names)}
     elif options.active:
         given["layers"] = "active"
-    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched"):
+    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched", "keys_by"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     for side in ("source", "target"):

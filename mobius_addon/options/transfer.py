@@ -151,6 +151,16 @@ class TransferOptions(SourceMaskOptions):
         ),
         default=_TRANSFER.unmatched,
     )  # fmt: skip
+    keys_by: bpy.props.EnumProperty(
+        name="Fit",
+        description="How shape keys get the directions and proportions of the target",
+        items=(
+            ("gradients", "Whole Shape", "What is stretched or turned on the source is so on the target; the rest "
+             "follows smoothly"),
+            ("frames", "Each Vertex", "Each vertex moves as the surface right around it is turned and scaled"),
+        ),
+        default=_TRANSFER.keys_by,
+    )  # fmt: skip
     evaluated: bpy.props.BoolProperty(
         name="Evaluated Source",
         description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
@@ -213,7 +223,7 @@ def transfer_settings(options: Any) -> TransferSettings:
     kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
     receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
     own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
-    own += ("unmatched", "evaluated")
+    own += ("unmatched", "keys_by", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
     textures = TextureSettings(
