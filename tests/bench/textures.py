@@ -276,7 +276,7 @@ def picture(path: Path, outcomes: list[Outcome]) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(1, len(outcomes), figsize=(2.6 * len(outcomes), 3), layout="constrained")
+    figure, axes = plt.subplots(1, len(outcomes), figsize=(2.2 * len(outcomes), 3.1), layout="constrained")
     for ax, x in zip(axes, outcomes, strict=True):
         ax.imshow(x.picture, origin="lower", interpolation="nearest")
         ax.axis("off")
