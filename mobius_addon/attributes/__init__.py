@@ -2,6 +2,12 @@
 
 from .access import (
     DISC_LAYOUT,
+    LIVE_CONFIDENCE,
+    LIVE_CORNERS,
+    LIVE_FACE,
+    LIVE_MATCHED,
+    LIVE_NAMES,
+    LIVE_WEIGHTS,
     MATCHED_GROUP,
     MAX_UV_MAPS,
     OWN_NAMES,
@@ -27,6 +33,12 @@ from .vertex_groups import VertexGroupAccess
 __all__ = [
     "DISC_LAYOUT",
     "KINDS",
+    "LIVE_CONFIDENCE",
+    "LIVE_CORNERS",
+    "LIVE_FACE",
+    "LIVE_MATCHED",
+    "LIVE_NAMES",
+    "LIVE_WEIGHTS",
     "MATCHED_GROUP",
     "MAX_UV_MAPS",
     "OWN_NAMES",

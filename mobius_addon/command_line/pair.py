@@ -78,6 +78,22 @@ def align_pair(
     return alignment, correspondence
 
 
+def fitting_map(options: argparse.Namespace, surfaces: tuple[Surface, Surface]) -> Correspondence:
+    """Load the map that was given, and make sure that it is one between these two meshes."""
+    from ...solver import load_map
+    from ..files import Unreadable
+
+    path = options.use_map
+    if not path.is_file():
+        raise Unreadable(f"there is no file '{path}'")
+    try:
+        return load_map(path, *(surface.rest for surface in surfaces))
+    except OSError as error:
+        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
+
+
 def _landmarks(
     options: argparse.Namespace, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]
 ) -> Integers | None:
