@@ -11,6 +11,7 @@ from .. import stored_alignment
 from ..operators.align import MOBIUS_OT_align
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS
 from .place import MobiusSubPanel, hand_on
+from .remedies import draw_remedies
 
 
 class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
@@ -43,6 +44,7 @@ class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
             row.label(text=name)
             row.label(text=value, translate=False)
         _draw_doubts(layout, settings, found)
+        draw_remedies(layout, settings, found)
 
 
 def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:

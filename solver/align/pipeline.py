@@ -13,6 +13,7 @@ from .alignment import Alignment
 from .confidence import BOUND
 from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
+from .diagnosis import causes, coarse
 from .inside_out import turned_round
 from .landmarks import own_landmarks
 from .mobius_map import roughly_aligned
@@ -76,8 +77,12 @@ def align(
     found = replace(found, seconds=clock.seconds, warnings=warnings)
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
-        found = replace(found, warnings=(*found.warnings, said))
-    return found
+        known = causes(found, source, target)
+        likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
+        kinds = tuple(cause.kind for cause in known)
+        return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
+    cause = coarse(found)
+    return found if cause is None else replace(found, warnings=(*found.warnings, cause.text), causes=(cause.kind,))
 
 
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:

@@ -61,6 +61,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "seconds": dict(alignment.seconds),
         "settings": asdict(alignment.settings),
         "warnings": list(alignment.warnings),
+        "causes": list(alignment.causes),
     }
 
 

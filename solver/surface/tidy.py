@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .gluing import glue_of, vertices_of_glue
-from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh
+from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, directed_edges, plural
 
 Value = TypeVar("Value", bound=np.generic)
 
@@ -24,7 +24,7 @@ class Cleaned:
         The original itself where there was nothing to do. Its first vertices are the original's, in use or not, so that
         their numbers keep their meaning; further ones are where a vertex of the original has become several.
     faces : (m,) int
-        The original face that each face was.
+        The original face that each face was; -1 for one that was put where a single one is missing.
     reversed : (m,) bool
         Faces whose second and third corners changed places.
     changes : tuple of str
@@ -76,6 +76,21 @@ class Cleaned:
             share=self.share * float(mesh.face_areas[chosen].sum() / mesh.area),
         )
 
+    def without_pinholes(self) -> Cleaned:
+        """Return it with a face in each opening of three edges, but for the longest boundary."""
+        mesh = self.mesh
+        loops = pinholes(mesh)
+        if not len(loops):
+            return self
+        said = f"{plural(len(loops), 'missing triangle')} put in"
+        return replace(
+            self,
+            mesh=TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, loops]), mesh.name),
+            faces=np.concatenate([self.faces, np.full(len(loops), -1)]),
+            reversed=np.concatenate([self.reversed, np.zeros(len(loops), bool)]),
+            changes=(*self.changes, said),
+        )
+
     @property
     def size(self) -> int:
         """Vertices of the original."""
@@ -97,7 +112,8 @@ class Cleaned:
         result = self.at_vertices(values, absent)[self.original_faces]
         own = values[self.mesh.faces]
         own[self.reversed] = own[self.reversed][:, [0, 2, 1]]
-        result[self.faces] = own
+        kept = self.faces >= 0
+        result[self.faces[kept]] = own[kept]
         return result
 
     def vertices_for(self, original: Integers) -> Integers:
@@ -136,3 +152,20 @@ def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
     chosen[place[part != np.argmax(area)]] = False
     share = float(mesh.face_areas[chosen].sum() / mesh.area)
     return tidy.only(chosen, f"cut to a piece of {share:.1%} of its area, as asked; the rest has no counterpart")
+
+
+def pinholes(mesh: TriangleMesh) -> Integers:
+    """Return the openings of three edges of a manifold mesh as the faces that are missing there, (k, 3).
+
+    None where the mesh has no other boundary.
+    """
+    start, stop = directed_edges(mesh.faces)[mesh.twins < 0].T
+    ahead = np.full(len(mesh.vertices), -1)
+    ahead[start] = stop
+    second = ahead[start]
+    third = ahead[second]
+    once = np.bincount(start, minlength=len(ahead)) == 1  # where parts touch nothing is clear
+    around = (ahead[third] == start) & once[start] & once[second] & once[third] & (start < np.minimum(second, third))
+    if 3 * int(around.sum()) == len(start):
+        return np.empty((0, 3), np.intp)
+    return np.stack([start, third, second], axis=1)[around]
