@@ -13,6 +13,7 @@ from .attributes import KINDS
 from .heat_maps import MAP_MEASURES
 from .jobs import Job, MOBIUS_OT_stop, describe_proof
 from .operators.align import MOBIUS_OT_align
+from .operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from .operators.check import MOBIUS_OT_check
 from .operators.clear import MOBIUS_OT_clear
 from .operators.conformal_transfer import MOBIUS_OT_conformal_transfer
@@ -73,6 +74,9 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             column.scale_y = 1.4
             button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
             _hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
+            if len(selected_targets(context)) > 1:
+                several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
+                _hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
 
 
 class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
