@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..streams import say_error
-from . import align, check, collection, demo, flatten, transfer
+from . import align, check, collection, demo, flatten, transfer, wrap
 
 _COMMANDS = {
     "demo": demo,
@@ -14,6 +14,7 @@ _COMMANDS = {
     "flatten": flatten,
     "align": align,
     "transfer": transfer,
+    "wrap": wrap,
     "collection": collection,
 }
 

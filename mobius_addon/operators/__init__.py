@@ -13,10 +13,12 @@ from . import (
     discs,
     flatten,
     heat_map,
+    live,
     select_unmatched,
     side_by_side,
     swap,
     transfer,
+    wrap,
 )
 
 _register, _unregister = register_factory(
@@ -27,6 +29,8 @@ _register, _unregister = register_factory(
         align.MOBIUS_OT_align,
         align_selected.MOBIUS_OT_align_selected,
         transfer.MOBIUS_OT_transfer,
+        wrap.MOBIUS_OT_wrap,
+        live.MOBIUS_OT_live,
         select_unmatched.MOBIUS_OT_select_unmatched,
         conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,
