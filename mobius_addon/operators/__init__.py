@@ -6,6 +6,7 @@ from .. import viewport
 from ..registration import register_factory
 from . import (
     align,
+    align_selected,
     check,
     clear,
     conformal_transfer,
@@ -26,6 +27,7 @@ _register, _unregister = register_factory(
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
         align.MOBIUS_OT_align,
+        align_selected.MOBIUS_OT_align_selected,
         transfer.MOBIUS_OT_transfer,
         wrap.MOBIUS_OT_wrap,
         live.MOBIUS_OT_live,

@@ -95,13 +95,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         """
         found = []
         for uid, name, surface in zip(self.objects_read, self._names, self.surfaces, strict=True):
-            obj = by_uid(bpy.data.objects, uid)
-            if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
-                raise Refusal(
-                    rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name)
-                )
-            if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
-                raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
+            obj = as_read(uid, name, surface)
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
             found.append(obj)
         return found[0], found[1]
@@ -162,15 +156,36 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
         self.announce(*pair, result)
 
 
+def as_read(uid: int, name: str, surface: Surface) -> bpy.types.Object:
+    """Return an object, if it is still what was read.
+
+    Raises
+    ------
+    Refusal
+        It is not.
+    """
+    obj = by_uid(bpy.data.objects, uid)
+    if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
+        raise Refusal(rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name))
+    if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
+        raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
+    return obj
+
+
 def write_alignment(
     source: bpy.types.Object,
     target: bpy.types.Object,
     alignment: solver.Alignment,
     correspondence: solver.Correspondence,
     surfaces: Any,
+    frame: solver.Mobius | None = None,
 ) -> None:
-    """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
-    carried, still = alignment.mobius(alignment.source.disc), alignment.mobius(alignment.carried)
+    """Write the shared UV layout, the colors and the groups of matched points on both meshes.
+
+    `frame` carries the source's disc to where the layout shows it; by default to the target's.
+    """
+    frame = frame or alignment.mobius
+    carried, still = frame(alignment.source.disc), frame(alignment.carried)
     here, there = (
         tidy or solver.Cleaned.unchanged(surface.mesh)
         for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)

@@ -8,6 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import topology_cache
 from ..jobs import Job, MOBIUS_OT_stop, describe_proof
 from ..operators.align import MOBIUS_OT_align
+from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check
 from ..operators.swap import MOBIUS_OT_swap
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
@@ -37,6 +38,9 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             column.scale_y = 1.4
             button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
             hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
+            if len(selected_targets(context)) > 1:
+                several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
+                hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
 
 
 def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: str) -> None:
