@@ -17,6 +17,7 @@ from . import (
     side_by_side,
     swap,
     transfer,
+    use_selected,
     wrap,
 )
 
@@ -25,6 +26,7 @@ _register, _unregister = register_factory(
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
+        use_selected.MOBIUS_OT_use_selected,
         align.MOBIUS_OT_align,
         transfer.MOBIUS_OT_transfer,
         wrap.MOBIUS_OT_wrap,

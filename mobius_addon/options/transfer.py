@@ -7,11 +7,7 @@ from typing import Any
 import bpy
 
 from ..attributes import KINDS, Mask, TransferSettings, mask_names, split_names
-
-
-def enum_identifier(kind: str) -> str:
-    """Return how Blender's enumerations spell a kind of data: 'vertex-groups' is 'VERTEX_GROUPS'."""
-    return kind.upper().replace("-", "_")
+from .kind_switches import KindSwitches, enum_identifier
 
 
 def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
@@ -47,7 +43,7 @@ class SourceMaskOptions:
     source_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the source gives")
 
 
-class TransferOptions(SourceMaskOptions):
+class TransferOptions(KindSwitches, SourceMaskOptions):
     """Mixin with the options of a transfer, named as in `attributes.TransferSettings`."""
 
     carry_to: bpy.props.EnumProperty(
