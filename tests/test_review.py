@@ -109,8 +109,10 @@ def test_only_files_are_asked_for_and_the_reason_fits() -> None:
 
 
 def test_the_wheels_are_for_pythons_that_blender_comes_with() -> None:
+    # the last for Linux distributions alone: without it their Blender does not install the extension
     pythons = {Path(wheel).name.split("-")[2] for wheel in MANIFEST["wheels"]}
-    assert pythons == {"py3", "cp311", "cp313"}
+    assert pythons == {"py3", "cp311", "cp313", "cp314"}
+    assert all("manylinux" in wheel for wheel in MANIFEST["wheels"] if "-cp314-" in wheel)
 
 
 def test_no_file_is_large_or_of_a_kind_that_nobody_can_read() -> None:

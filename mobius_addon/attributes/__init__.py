@@ -20,7 +20,7 @@ from .access import (
 )
 from .active import ActiveLayers, note, persons_own
 from .carrier import Carrier
-from .masks import mask_names, mask_weights
+from .masks import mask_names, mask_weights, piece_of
 from .plan import Carried, Transfer, restored_on_failure, write_transfers
 from .preview import Preview, preview
 from .reading import Reading, plan_transfer, read_transfer
@@ -67,6 +67,7 @@ __all__ = [
     "note",
     "numbered",
     "persons_own",
+    "piece_of",
     "plan_transfer",
     "preview",
     "read_transfer",

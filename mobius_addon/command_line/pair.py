@@ -54,6 +54,7 @@ def align_pair(
     settings: AlignSettings,
 ) -> tuple[Alignment, Correspondence]:
     """Align two surfaces, which were read from these files, and say what was found."""
+    from ..attributes import piece_of
     from ..computation import aligned
     from ..operators.align import summary
 
@@ -68,6 +69,7 @@ def align_pair(
         largest_part=options.largest_part,
         keys=(source.keys, target.keys),
         landmarks=pairs,
+        within=(piece_of(files[0].obj, options.source_cut), piece_of(files[1].obj, options.target_cut)),
     )
     for warning in alignment.warnings:
         say_error(f"mobius: warning: {warning}")

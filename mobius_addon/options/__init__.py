@@ -1,6 +1,6 @@
 """Options that operators and the scene's settings share, each defined once."""
 
-from .align import ALIGN_OPTIONS, AlignOptions, align_settings
+from .align import ALIGN_OPTIONS, OF_SCENE, AlignOptions, align_settings
 from .kind_switches import draw_kinds, enum_identifier
 from .scan import SCAN_OPTIONS, ScanOptions, outer_vertex, repair
 from .transfer import (
@@ -15,6 +15,7 @@ from .transfer_layout import draw_transfer
 
 __all__ = [
     "ALIGN_OPTIONS",
+    "OF_SCENE",
     "SCAN_OPTIONS",
     "SOURCE_MASK_OPTIONS",
     "TRANSFER_OPTIONS",

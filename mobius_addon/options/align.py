@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 
 from ...solver import AlignSettings
+from .names import nameable
 
 _DEFAULTS = AlignSettings()
 
@@ -42,6 +43,20 @@ class AlignOptions:
             ("groups", "Vertex Groups", "Vertex groups of equal names with a single vertex on either mesh"),
         ),
         default="none",
+    )
+    source_cut: bpy.props.StringProperty(
+        name="Cut Source To",
+        description="Vertex group or attribute around the piece of the source that is matched, such as a head; empty: "
+        "all of it, or where a body is too deep for a disc the piece that fits",
+        search=nameable("source"),
+        search_options={"SUGGESTION"},
+    )
+    target_cut: bpy.props.StringProperty(
+        name="Cut Target To",
+        description="Vertex group or attribute around the piece of the target that is matched, such as a head; empty: "
+        "all of it, or where a body is too deep for a disc the piece that fits",
+        search=nameable("target"),
+        search_options={"SUGGESTION"},
     )
     samples: bpy.props.IntProperty(
         name="Samples",
@@ -80,6 +95,9 @@ class AlignOptions:
 
 ALIGN_OPTIONS = tuple(AlignOptions.__annotations__)
 
+OF_SCENE = ("landmarks", "source_cut", "target_cut")
+"""Those that name something of a scene, which no preset knows and the solver is told as numbers."""
+
 
 def align_settings(
     options: Any, time_limit: float, outer: tuple[int | None, int | None] = (None, None)
@@ -88,6 +106,6 @@ def align_settings(
 
     A radius or time limit of 0 is none; `outer` are vertices on the outer loops of source and target.
     """
-    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name != "landmarks"}
+    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name not in OF_SCENE}
     chosen |= {"radius": options.radius or None, "time_limit": time_limit or None}
     return AlignSettings(**chosen, fill_holes=options.fill_holes, source_outer=outer[0], target_outer=outer[1])

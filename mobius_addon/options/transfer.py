@@ -1,24 +1,13 @@
 """Options of a transfer, named as in `attributes.TransferSettings`."""
 
 # no postponed annotations here: Blender reads the properties from them
-from collections.abc import Callable
 from typing import Any
 
 import bpy
 
-from ..attributes import KINDS, Mask, TransferSettings, mask_names, split_names
+from ..attributes import KINDS, Mask, TransferSettings, split_names
 from .kind_switches import KindSwitches, enum_identifier
-
-
-def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
-    """Return what suggests names for a mask of the scene's source or target."""
-
-    def suggest(_owner: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-        obj = getattr(context.scene.mobius, role)
-        return [] if obj is None or obj.type != "MESH" else mask_names(obj)
-
-    return suggest
-
+from .names import nameable
 
 _TRANSFER = TransferSettings()
 _MASK_ITEMS = (
@@ -37,7 +26,7 @@ class SourceMaskOptions:
     source_mask_name: bpy.props.StringProperty(
         name="Source Mask",
         description="Vertex group or attribute of the source; what has at least half of the full weight gives",
-        search=_nameable("source"),
+        search=nameable("source"),
         search_options={"SUGGESTION"},
     )
     source_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the source gives")
@@ -139,7 +128,7 @@ class TransferOptions(KindSwitches, SourceMaskOptions):
         name="Target Mask",
         description="Vertex group or attribute of the target; what can be mixed is mixed by it, anything else is "
         "carried to where it is at least half",
-        search=_nameable("target"),
+        search=nameable("target"),
         search_options={"SUGGESTION"},
     )
     target_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the target receives")
