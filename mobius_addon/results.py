@@ -180,13 +180,14 @@ def clear_results(obj: bpy.types.Object) -> int:
             mesh.uv_layers.remove(mesh.uv_layers[name])
         else:
             mesh.attributes.remove(mesh.attributes[name])
-    removed = len(names) + bool(mesh.mobius_alignment.target_fingerprint) + remove_live(obj)
+    kept = getattr(mesh, "mobius_alignment", None)  # commands run without the extension being registered
+    removed = len(names) + bool(kept and kept.target_fingerprint) + remove_live(obj)
     if MATCHED_GROUP in groups:
         groups.remove(groups[MATCHED_GROUP])
         removed += 1
     own.put_back(obj)
-    mesh.property_unset("mobius_alignment")
-    mesh.property_unset("mobius_before")
-    mesh.property_unset("mobius_transferred")
+    if kept is not None:
+        for name in ("mobius_alignment", "mobius_before", "mobius_transferred"):
+            mesh.property_unset(name)
     mesh.update()
     return removed

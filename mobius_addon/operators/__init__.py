@@ -18,6 +18,7 @@ from . import (
     side_by_side,
     swap,
     transfer,
+    use_selected,
     wrap,
 )
 
@@ -26,6 +27,7 @@ _register, _unregister = register_factory(
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
+        use_selected.MOBIUS_OT_use_selected,
         align.MOBIUS_OT_align,
         align_selected.MOBIUS_OT_align_selected,
         transfer.MOBIUS_OT_transfer,

@@ -23,7 +23,7 @@ from ..attributes import (
 from ..evaluated import Shown, evaluated
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
-from ..options import TransferOptions, draw_transfer, transfer_settings
+from ..options import TransferOptions, draw_kinds, draw_transfer, transfer_settings
 from ..usable import by_uid, why_not, why_not_aligned
 
 
@@ -43,12 +43,12 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
             cls.poll_message_set(reason)
         return not reason
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """Draw the choices."""
         self.layout.use_property_split = True
         column = self.layout.column()
         column.prop(self, "carry_to")
-        column.prop(self, "kinds")
+        draw_kinds(self.layout, self, context.scene.mobius.source)
         draw_transfer(self.layout, self)
 
     def prepare(self, context: bpy.types.Context) -> Work:

@@ -1,13 +1,13 @@
 """Options that operators and the scene's settings share, each defined once."""
 
 from .align import ALIGN_OPTIONS, OF_SCENE, AlignOptions, align_settings
+from .kind_switches import draw_kinds, enum_identifier
 from .scan import SCAN_OPTIONS, ScanOptions, outer_vertex, repair
 from .transfer import (
     SOURCE_MASK_OPTIONS,
     TRANSFER_OPTIONS,
     SourceMaskOptions,
     TransferOptions,
-    enum_identifier,
     source_mask,
     transfer_settings,
 )
@@ -24,6 +24,7 @@ __all__ = [
     "SourceMaskOptions",
     "TransferOptions",
     "align_settings",
+    "draw_kinds",
     "draw_transfer",
     "enum_identifier",
     "outer_vertex",

@@ -7,13 +7,8 @@ import bpy
 
 from ..attributes import KINDS, Mask, TransferSettings, split_names
 from ..textures.settings import SIZES, TextureSettings
+from .kind_switches import KindSwitches, enum_identifier
 from .names import nameable
-
-
-def enum_identifier(kind: str) -> str:
-    """Return how Blender's enumerations spell a kind of data: 'vertex-groups' is 'VERTEX_GROUPS'."""
-    return kind.upper().replace("-", "_")
-
 
 _TRANSFER = TransferSettings()
 _TEXTURES = TextureSettings()
@@ -39,7 +34,7 @@ class SourceMaskOptions:
     source_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the source gives")
 
 
-class TransferOptions(SourceMaskOptions):
+class TransferOptions(KindSwitches, SourceMaskOptions):
     """Mixin with the options of a transfer, named as in `attributes.TransferSettings`."""
 
     carry_to: bpy.props.EnumProperty(

@@ -11,6 +11,7 @@ from ..operators.align import MOBIUS_OT_align
 from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check
 from ..operators.swap import MOBIUS_OT_swap
+from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
 from ..usable import why_not
@@ -29,6 +30,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         row = layout.row()
         row.alignment = "CENTER"
         row.operator(MOBIUS_OT_swap.bl_idname, text="Swap", icon="FILE_REFRESH")
+        row.operator(MOBIUS_OT_use_selected.bl_idname, icon="RESTRICT_SELECT_OFF")
         _draw_picker(layout, context, "target")
         layout.separator()
         if Job.current is not None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..attributes import KINDS
 from ..operators.select_unmatched import MOBIUS_OT_select_unmatched
 from ..operators.transfer import MOBIUS_OT_transfer
-from ..options import SOURCE_MASK_OPTIONS, TRANSFER_OPTIONS, draw_transfer, enum_identifier
+from ..options import SOURCE_MASK_OPTIONS, TRANSFER_OPTIONS, draw_kinds, draw_transfer
 from ..preset_menus import MOBIUS_PT_transfer_presets
 from ..transfer_preview import draw_preview
 from .place import MobiusPanel, MobiusSubPanel, hand_on
@@ -22,14 +21,7 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice of data and the button."""
         layout, settings = self.layout, context.scene.mobius
-        column = layout.column(align=True)
-        column.emboss = "NONE"
-        for kind in KINDS:
-            identifier = enum_identifier(kind.identifier)
-            icon = "CHECKBOX_HLT" if identifier in settings.kinds else "CHECKBOX_DEHLT"
-            row = column.row()
-            row.alignment = "LEFT"
-            row.prop_enum(settings, "kinds", identifier, icon=icon)
+        draw_kinds(layout, settings, settings.source)
         draw_preview(layout, context)
         column = layout.column()
         column.scale_y = 1.4

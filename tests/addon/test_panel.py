@@ -37,9 +37,9 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.notes.append(text)
 
-    def prop(self, owner: Any, name: str, **_: Any) -> None:
+    def prop(self, owner: Any, name: str, *, text: str = "", **_: Any) -> None:
         assert name in owner.bl_rna.properties, name
-        self.notes.append(name)
+        self.notes.append(text if name.startswith("carry_") and text else name)
 
     def prop_enum(self, owner: Any, name: str, value: str, **_: Any) -> None:
         assert value in owner.bl_rna.properties[name].enum_items
@@ -276,6 +276,43 @@ def test_german_covers_the_interface() -> None:
     for english, german in GERMAN.items():
         assert fields(english) == fields(german), english
         assert english.endswith(":") == german.endswith(":"), english
+
+
+# kinds of data
+
+
+def test_kinds_are_checkboxes_with_counts(pair: tuple[Any, Any]) -> None:
+    settings = bpy.context.scene.mobius
+    settings.carry_none = True
+    assert settings.kinds == set()
+    assert settings.carry_none
+    assert not settings.carry_all
+    settings.carry_vertex_groups = True
+    settings.carry_uv = True
+    assert settings.kinds == {"VERTEX_GROUPS", "UV"}
+    settings.carry_uv = False
+    assert settings.kinds == {"VERTEX_GROUPS"}
+    said = drawn(panel.MOBIUS_PT_transfer)
+    assert {"carry_all", "carry_none", "Vertex Groups 1", "UV Maps 1", "Shape Keys 0", "Materials"} <= set(said)
+    bpy.ops.mobius.align(**QUICK)
+    bpy.ops.mobius.transfer(kinds=settings.kinds)
+    assert not pair[1].data.uv_layers.get("UVMap")
+    settings.carry_all = True
+    assert len(settings.kinds) == 12
+
+
+def test_the_selection_is_used_from_active_to_selected(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    settings = bpy.context.scene.mobius
+    settings.source = settings.target = None
+    for obj in pair:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = source
+    assert bpy.ops.mobius.use_selected() == {"FINISHED"}
+    assert (settings.source, settings.target) == (source, target)
+    target.select_set(False)
+    with pytest.raises(RuntimeError, match="Select two meshes, the source last"):
+        bpy.ops.mobius.use_selected()
 
 
 # after a transfer

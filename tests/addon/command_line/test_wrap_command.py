@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import QUICK, run
+from commands import QUICK, program, run
 from scenes import positions, weights
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
@@ -61,3 +61,12 @@ def test_inputs_are_not_written_over(scans: Path, capsys: pytest.CaptureFixture[
     assert status == 2
     assert "there is no file" in err
     assert digest(target) == before
+
+
+def test_the_program_by_itself_wraps(scans: Path) -> None:
+    """Without the extension being registered, as the other tests have it."""
+    done = program("wrap", "source.blend", "target.obj", "-o", "out.obj", *QUICK, cwd=scans)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "of the vertices lie where the map says" in done.stdout
+    assert (scans / "out.obj").is_file()
