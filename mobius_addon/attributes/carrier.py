@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ...solver import Correspondence
+from ...solver.carry.contacts import brought_together
 from ...solver.carry.corners import CornerInterpolation
 from ...solver.carry.elements import edges_in_reach, source_of_corners, source_of_edges, source_of_faces
 from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
@@ -37,6 +38,8 @@ class Carrier:
     keys_by : str
         How displacements get their direction and size: by "gradients" of the whole deformation (`GradientTransfer`), or
         each by the "frames" around its vertex (`local_similarities`).
+    contacts : bool
+        What a displacement brings together on the source, as lids and lips, is brought together too; by gradients only.
     """
 
     correspondence: Correspondence
@@ -44,6 +47,7 @@ class Carrier:
     target: Surface
     gap: Literal["leave", "nearest", "fill"] = "leave"
     keys_by: Literal["gradients", "frames"] = "gradients"
+    contacts: bool = True
 
     def points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per vertex, (n_source, ...), linearly.
@@ -138,7 +142,10 @@ class Carrier:
     def displacements(self, values: Values) -> tuple[Values, Booleans]:
         """Carry vectors per vertex, (n_source, 3), turned and scaled with the surface; returns as `points`."""
         if self.keys_by == "gradients":
-            return self._filled(self._gradients(values))
+            carried = self._gradients(values)
+            if self.contacts:
+                carried = brought_together(self._gradients, carried, self._gradients.moved_places(values))
+            return self._filled(carried)
         rotation, scale = self._similarities
         carried = self._matrix @ values
         return self.filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
@@ -173,6 +180,11 @@ class Carrier:
             return values, self.reached
         filled = values[self._nearest] if self.gap == "nearest" else self._fill(values)
         return filled, self.reached
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether the map takes the source to a mirror image."""
+        return bool(np.linalg.det(self._similarities[0]).sum() < 0)
 
     @cached_property
     def reached(self) -> Booleans:

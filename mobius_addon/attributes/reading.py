@@ -17,6 +17,7 @@ from .carrier import Carrier, Values
 from .chosen import chosen_layers
 from .key_animation import left_behind
 from .key_set import KeyPlan, KeySet, key_set, planned
+from .layer_names import named_layers
 from .looks import Looks, looks_of
 from .missing import carried_without_missing, missing_warning
 from .mixing import changes, mixed, over
@@ -223,7 +224,7 @@ def read_transfer(
         Nothing to carry.
     """
     read, warnings, locked = [], [], []
-    along_keys = replace(keys_carrier or carrier, keys_by=settings.keys_by)
+    along_keys = replace(keys_carrier or carrier, keys_by=settings.keys_by, contacts=settings.contacts)
     for row in ROWS:
         if row.kind in settings.kinds:
             keys = row.kind == "shape-keys"
@@ -231,27 +232,31 @@ def read_transfer(
             layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
             if keys and not _groups_come_along(settings, shown_source):
                 layers = [limited(layer) for layer in layers]
-            read.append((row, way, layers))
+            mirrors = row.kind in ("vertex-groups", "shape-keys") and bool(layers) and carrier.mirrors
+            named, notes = named_layers(row.kind, layers, settings.spelling, mirrors)
+            warnings += notes
+            read.append((row, way, named))
     pending: list[_Pending] = []
-    reserved = {layer.name for _, _, layers in read for layer in layers}
+    reserved = {name for _, _, layers in read for _, name in layers}
     earlier = unedited(target, settings.kinds)
     for row, way, layers in read:
         found = []
-        for layer in layers:
-            name = row.access.place(target, layer.name, {x.place.name for x in pending} | {x[1] for x in found})
+        for layer, wanted in layers:
+            name = row.access.place(target, wanted, {x.place.name for x in pending} | {x[1] for x in found})
             if name is None:
-                warnings.append(f"'{layer.name}' is locked on '{target.name}' and left as it is")
-                locked += [layer.name] if row.kind == "vertex-groups" else []
+                warnings.append(f"'{wanted}' is locked on '{target.name}' and left as it is")
+                locked += [wanted] if row.kind == "vertex-groups" else []
                 continue
-            if name != layer.name and not row.marks:
-                warnings.append(f"'{target.name}' has something else named '{layer.name}': it becomes '{name}'")
+            if name != wanted and not row.marks:
+                warnings.append(f"'{target.name}' has something else named '{wanted}': it becomes '{name}'")
             found.append((layer, name))
         names = [name for _, name in found]
+        wanted_of = {layer.name: name for layer, name in layers}
         there = row.access.existing(target, names)
         if isinstance(row.access, ShapeKeyAccess) and joins(row, settings):
             there = row.access.shown(target, names)
         for layer, name in found:
-            place = _place(row, target, layer.name, name, there.get(name), earlier, reserved)
+            place = _place(row, target, layer.name, name, there.get(name), earlier, reserved, wanted_of[layer.name])
             reserved |= {x for x in (place.before, place.beside) if x is not None}
             pending.append(_Pending(row, way, layer, place))
     textures = None
@@ -311,6 +316,7 @@ def _place(
     there: Values | None,
     earlier: Iterable[Written],
     reserved: set[str],
+    wanted: str,
 ) -> Place:
     """Return where a layer can go: under a name that it is to have, and beside what has it."""
     ours = [x for x in earlier if x.kind == row.kind]
@@ -318,7 +324,7 @@ def _place(
     if there is None or row.once or is_ours:
         return Place(name, there, is_ours)
     before = [x.name for x in ours if x.source_name == source_name and x.name not in reserved]
-    beside = row.access.place(target, source_name, reserved, number=True)
+    beside = row.access.place(target, wanted, reserved, number=True)
     return Place(name, there, False, next(iter(before), None), beside)
 
 

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from typing import Literal
 
 from ..textures.settings import TextureSettings
+from .expression_names import Spelling
 from .table import KINDS
 
 Outcome = Literal["carry", "leave", "nearest", "fill"]
@@ -64,6 +65,10 @@ class TransferSettings:
         they have, the value of the "nearest" vertex that does, or a smooth "fill" between those.
     keys_by : str
         How shape keys get the target's directions and proportions, see `Carrier.keys_by`.
+    contacts : bool
+        Bring together what shape keys bring together on the source, see `Carrier.contacts`.
+    spelling : str
+        How carried expressions are called, see `expression_names.Spelling`.
     evaluated : bool
         Read the source as its modifiers and shape keys show it.
     collisions : str
@@ -92,6 +97,8 @@ class TransferSettings:
     target_mask: Mask = field(default_factory=Mask)
     unmatched: Outcome = "carry"
     keys_by: Literal["gradients", "frames"] = "gradients"
+    contacts: bool = True
+    spelling: Spelling = "keep"
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"
     textures: TextureSettings = field(default_factory=TextureSettings)

@@ -53,6 +53,19 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         "(default), or vertex by vertex by the frames of the surface",
     )
     group.add_argument(
+        "--no-contacts",
+        dest="contacts",
+        action="store_false",
+        default=None,
+        help="leave open what shape keys close on the source, as lids and lips, where the carried shape does not",
+    )
+    group.add_argument(
+        "--rename",
+        dest="spelling",
+        choices=("keep", "arkit", "underscore", "dot"),
+        help="how known expressions are called: as on the source (default), eyeBlinkLeft, eyeBlink_L or eyeBlink.L",
+    )
+    group.add_argument(
         "--evaluated", action="store_true", help="the source as its modifiers and the mix of its shape keys show it"
     )
 
@@ -105,7 +118,17 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
         given |= {"layers": "named", "names": split_names(options.names)}
     elif options.active:
         given["layers"] = "active"
-    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched", "keys_by"):
+    for name in (
+        "collisions",
+        "mix",
+        "mix_factor",
+        "limit",
+        "smallest_weight",
+        "unmatched",
+        "keys_by",
+        "contacts",
+        "spelling",
+    ):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     for side in ("source", "target"):

@@ -156,6 +156,22 @@ class TransferOptions(KindSwitches, SourceMaskOptions):
         ),
         default=_TRANSFER.keys_by,
     )  # fmt: skip
+    contacts: bpy.props.BoolProperty(
+        name="Keep Contacts",
+        description="Lids and lips that a shape key closes on the source are closed on the target too",
+        default=_TRANSFER.contacts,
+    )
+    spelling: bpy.props.EnumProperty(
+        name="Rename",
+        description="How known expressions are called on the target",
+        items=(
+            ("keep", "As on the Source", "Names stay as they are"),
+            ("arkit", "eyeBlinkLeft", "As ARKit calls its 52, and visemes as Oculus does"),
+            ("underscore", "eyeBlink_L", "The same with _L and _R for the sides"),
+            ("dot", "eyeBlink.L", "The same with .L and .R, which Blender's own mirror tools know"),
+        ),
+        default=_TRANSFER.spelling,
+    )
     evaluated: bpy.props.BoolProperty(
         name="Evaluated Source",
         description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
@@ -218,7 +234,7 @@ def transfer_settings(options: Any) -> TransferSettings:
     kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
     receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
     own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
-    own += ("unmatched", "keys_by", "evaluated")
+    own += ("unmatched", "keys_by", "contacts", "spelling", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
     textures = TextureSettings(

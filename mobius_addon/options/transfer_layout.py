@@ -33,7 +33,10 @@ def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     column.prop(options, "normalize")
     column.prop(options, "limit")
     column.prop(options, "smallest_weight")
-    layout.column(heading="Shape Keys").prop(options, "keys_by")
+    column = layout.column(heading="Shape Keys")
+    column.prop(options, "keys_by")
+    column.prop(options, "contacts")
+    column.prop(options, "spelling")
     layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
     if enum_identifier("textures") in options.kinds:
         column = layout.column(heading="Textures")

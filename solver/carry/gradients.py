@@ -40,8 +40,8 @@ class GradientTransfer:
     A displacement deforms each of these triangles and its normal by a matrix S. On the target the displacement w is
     sought that is nearest to the integral of |T - S|^2 over all triangles (Sumner and Popović 2004, equation 7; with
     areas as Botsch et al. 2006, where it is a Poisson equation), T being how w deforms a triangle, plus that of
-    |w - w0|^2 / l^2: w0 is the displacement itself, turned and scaled as the surface is far around, which says where parts
-    go that hang together with nothing.
+    |w - w0|^2 / l^2: w0 is the displacement itself, turned and scaled as the surface is far around, which says where
+    parts go that hang together with nothing.
 
     Attributes
     ----------
@@ -128,6 +128,10 @@ class GradientTransfer:
         result += self._solve(self._divergence(wanted - (result[stop] - result[start]).reshape(wanted.shape)))
         result[~self.known] = 0
         return result
+
+    def moved_places(self, displacements: Floats) -> Floats:
+        """Return displacements of the source's vertices, (n_source, 3), at the places of the target's, (n, 3)."""
+        return self._matrix @ displacements
 
     def yielding(self, force: Floats) -> Floats:
         """Return the displacement, (n, 3), that yields to forces on vertices, (n, 3), as this system resists them."""
