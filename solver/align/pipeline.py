@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy.typing as npt
 
-from ..stages import Progress, Stages
+from ..stages import Part, Progress, Stages
 from ..surface.mesh import TriangleMesh
 from .alignment import Alignment
+from .completing import completed
 from .confidence import BOUND
 from .dense import bent_densely, drafted_from
 from .inside_out import turned_round
@@ -58,7 +59,7 @@ def align(
     settings = settings or AlignSettings()
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
-    target = _surface(target_mesh, settings, settings.target_outer)
+    given = target = _surface(target_mesh, settings, settings.target_outer)
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
     found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
     if settings.refine == "dense":
@@ -68,13 +69,24 @@ def align(
         if other is not None:
             found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
-            found = reconsidered(found, matched, clock.part(0.97, 1))
+            found = reconsidered(found, matched, clock.part(0.97, 0.98))
+    found = _with_other_parts(found, source, given, clock.part(0.98, 1))
     clock.end()
     found = replace(found, seconds=clock.seconds, warnings=(*source.notes, *target.notes, *found.warnings))
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         found = replace(found, warnings=(*found.warnings, said))
     return found
+
+
+def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:
+    """Return the alignment with what belongs to what beyond the main parts, if that is asked for and there is more."""
+    if found.settings.parts == "main" or source.tidy is not None or target.tidy is not None:
+        return found
+    if not (source.largest_part and target.largest_part):
+        return found
+    clock.begin("parts", "Pairing parts", 0.0)
+    return replace(found, whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
 
 
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:

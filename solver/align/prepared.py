@@ -17,6 +17,7 @@ from ..surface.cleaning import cleaned
 from ..surface.descriptors import diffused_curvatures
 from ..surface.fairing import faired
 from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
+from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
 from ..surface.tidy import Cleaned
@@ -84,6 +85,11 @@ class Surface:
         if self.tidy is not None:
             return self.tidy
         return cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """All parts of the mesh as it was given, the one that is in order first."""
+        return Parts.of(self.original, self.cleaned, self.keys)
 
     @cached_property
     def flattening(self) -> Flattening:
