@@ -323,4 +323,12 @@ GERMAN = {
     "{:.2f} of {:.2f}": "{:.2f} von {:.2f}",
     "{} is under way: press ESC to stop it": "{} läuft: ESC bricht ab",
     "{} stopped: nothing was changed": "{} abgebrochen: Nichts wurde geändert",
+    "Every part, as eyes, teeth and lashes, with its counterpart on the other mesh": "Jeder Teil, wie Augen, Zähne und Wimpern, mit seinem Gegenstück auf dem anderen Mesh",
+    "Only the largest part of each mesh": "Nur der größte Teil jedes Meshes",
+    "Which parts of meshes that have several are aligned": "Welche Teile ausgerichtet werden, wo ein Mesh mehrere hat",
+    "Parts": "Teile",
+    "Largest": "Größter",
+    "{}: {:,} vertices": "{}: {:,} Punkte",
+    "and {} more, see the report": "und {} weitere, siehe Bericht",
+    "Pairing parts": "Teile zuordnen",
 }

@@ -37,6 +37,9 @@ from .preset_menus import MOBIUS_PT_align_presets, MOBIUS_PT_transfer_presets
 from .transfer_preview import draw_preview
 from .usable import why_not
 
+MOST_ROWS = 60
+"""Parts that the panel lists: a head has up to 56, hair has hundreds of cards."""
+
 
 class MobiusPanel:
     """Where all panels of the extension are."""
@@ -105,6 +108,35 @@ class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
             row.label(text=name)
             row.label(text=value, translate=False)
         _draw_doubts(layout, settings, found)
+
+
+class MOBIUS_PT_parts(MobiusPanel, bpy.types.Panel):
+    """Which part of the target is which of the source."""
+
+    bl_label = "Parts"
+    bl_parent_id = "MOBIUS_PT_result"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where an alignment is of meshes with several parts."""
+        return MOBIUS_PT_result.poll(context) and bool(_parts_of(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw a row for each part."""
+        column = self.layout.column(align=True)
+        row = column.split(factor=0.5)
+        row.label(text="Source")
+        row.label(text="Target")
+        found = _parts_of(context)
+        for pair in found[:MOST_ROWS]:
+            row = column.split(factor=0.5)
+            for role in ("source", "target"):
+                own, icon = pair[role], "LINKED" if pair["source"] and pair["target"] else "UNLINKED"
+                text = "–" if own is None else iface_("{}: {:,} vertices").format(own["part"] + 1, own["vertices"])
+                row.label(text=text, icon=icon if role == "source" else "NONE", translate=False)
+        if len(found) > MOST_ROWS:
+            column.label(text=iface_("and {} more, see the report").format(len(found) - MOST_ROWS), translate=False)
 
 
 class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
@@ -297,8 +329,17 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
             (iface_("Shared Target"), f"{parts['target_share']:.0%}"),
             (iface_("Value There"), iface_("{:.2f} of {:.2f}").format(parts["value"], parts["upper_bound"])),
         ]
+    if several := found.get("parts"):
+        paired = sum(bool(pair["source"] and pair["target"]) for pair in several)
+        rows.append((iface_("Parts"), iface_("{:,} of {:,}").format(paired, sum(bool(x["target"]) for x in several))))
     rows.append((iface_("Time"), iface_("{:.1f} s").format(sum(found["seconds"].values()))))
     return rows
+
+
+def _parts_of(context: bpy.types.Context) -> list[dict[str, Any]]:
+    """Return the rows of the report about parts."""
+    found = stored_alignment.figures(context.scene.mobius.target)
+    return (found or {}).get("parts") or []
 
 
 def _behind(margin: float) -> str:
@@ -343,6 +384,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
     (
         MOBIUS_PT_main,
         MOBIUS_PT_result,
+        MOBIUS_PT_parts,
         MOBIUS_PT_pictures,
         MOBIUS_PT_transfer,
         MOBIUS_PT_transfer_settings,

@@ -72,7 +72,9 @@ def align(
             found = reconsidered(found, matched, clock.part(0.97, 0.98))
     found = _with_other_parts(found, source, given, clock.part(0.98, 1))
     clock.end()
-    found = replace(found, seconds=clock.seconds, warnings=(*source.notes, *target.notes, *found.warnings))
+    others = found.whole is not None
+    notes = (*source.notes_with(others), *target.notes_with(others), *(found.whole.notes if found.whole else ()))
+    found = replace(found, seconds=clock.seconds, warnings=(*notes, *found.warnings))
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         found = replace(found, warnings=(*found.warnings, said))

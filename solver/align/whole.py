@@ -53,3 +53,27 @@ class Whole:
     barycentric: Floats
     confidence: Floats
     leader: Integers
+
+    def counts(self) -> tuple[int, int, int]:
+        """Return how many parts have a counterpart, how many of the target's have none, and of the source's."""
+        paired = sum(pair.source is not None and pair.target is not None for pair in self.pairs)
+        return paired, len(self.target) - paired, len(self.source) - paired
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the person should know about parts without a counterpart, each a sentence."""
+        _, here, there = self.counts()
+        target, source = (parts.mesh.name for parts in (self.target, self.source))
+        notes = []
+        if here:
+            notes.append(
+                f"'{target}': {_of_parts(here, len(self.target))} no counterpart on '{source}': vertex groups and "
+                "shape keys come from the surface next to them, all else stays as it is"
+            )
+        if there:
+            notes.append(f"'{source}': {_of_parts(there, len(self.source))} no counterpart on '{target}'")
+        return tuple(notes)
+
+
+def _of_parts(count: int, total: int) -> str:
+    return f"{count:,} of {total:,} parts {'has' if count == 1 else 'have'}"

@@ -69,6 +69,10 @@ def cleaned(
     return work.result()
 
 
+LEFT_OUT = ("smaller part left out", "smaller parts left out")
+"""How what is said of other parts ends."""
+
+
 class _Work:
     """A mesh while it is put in order."""
 
