@@ -25,6 +25,10 @@ SPREAD = 3.0
 normal deviations of 1 in space. Neighbouring teeth are told apart where most parts are at the right place to a tenth of
 a tooth, and one that is farther off than most, as a tongue, is still found."""
 
+LEAST = 0.25
+"""Least of that deviation, in `BOUND`: three of them are less than the way from tooth to tooth, 2 % of a head's diagonal,
+and four times what parts of two good heads are off by."""
+
 STIFF = 0.1
 """Extent, in diagonals, below which a part that rides along does so as one piece: buttons and teeth are not bent."""
 
@@ -169,7 +173,8 @@ class _Work:
         carried = self.space_at(centre)
         if len(self.pairs):
             apart = np.linalg.norm(here[self.pairs[:, 0]] - carried[self.pairs[:, 1]], axis=1)
-            self.off = min(self.off, SPREAD * float(np.median(apart)) / 1.54)
+            usual = max(SPREAD * float(np.median(apart)) / 1.54, LEAST * BOUND * self.diagonal)
+            self.off = min(self.off, usual)
         pairs, cost = costs(
             (here[1:], of_source[1:], self.source.shape[1:]),
             (carried[1:], self.space_at.covariances(about)[1:], self.target.shape[1:]),

@@ -16,7 +16,7 @@ WEIGHT = 0.1
 UV = 0.02
 """Distance in the UV square up to which a corner is right."""
 
-MOVING = 0.01
+MOVING = 0.05
 """Share of the largest displacement of a key from which on a part is moved by it."""
 
 
