@@ -13,7 +13,7 @@ from ..surface.parts import Part, Parts
 from .alignment import Alignment
 from .confidence import BOUND
 from .counterparts import assigned, certainty_of, costs
-from .part_map import PartMap, part_map
+from .part_map import PartMap, part_maps
 from .space import MOST_POINTS, Similarities, SpaceMap
 from .whole import Pair, Whole
 
@@ -26,8 +26,8 @@ normal deviations of 1 in space. Neighbouring teeth are told apart where most pa
 a tooth, and one that is farther off than most, as a tongue, is still found."""
 
 LEAST = 0.25
-"""Least of that deviation, in `BOUND`: three of them are less than the way from tooth to tooth, 2 % of a head's diagonal,
-and four times what parts of two good heads are off by."""
+"""Least of that deviation, in `BOUND`: three of them are less than from tooth to tooth, 2 % of a head's diagonal, and
+that is four times what those of two good heads are off."""
 
 STIFF = 0.1
 """Extent, in diagonals, below which a part that rides along does so as one piece: buttons and teeth are not bent."""
@@ -59,15 +59,19 @@ def completed(
     face, barycentric = np.full(size, -1), np.zeros((size, 3))
     confidence, leader = np.zeros(size), np.full(size, -1)
     offsets: dict[int, float] = {}
-    for done, (one, other) in enumerate(work.pairs):
-        tell(0.2 + 0.7 * done / len(work.pairs))
-        mine, its = target.part(other), source.part(one)
-        own = part_map(its, mine, work.space_at.only(other, mine.mesh.vertices))
+    several = [(source.part(one), target.part(other)) for one, other in work.pairs]
+    near = [
+        (its, mine, work.space_at.only(other, mine.mesh.vertices))
+        for (its, mine), other in zip(several, work.pairs[:, 1], strict=True)
+    ]
+    maps = part_maps(near, lambda share: tell(0.2 + 0.7 * share))
+    for (its, mine), other, own in zip(several, work.pairs[:, 1].tolist(), maps, strict=True):
         # where parts touch a vertex is the first one's
         rows, vertices = _first(mine, target, other)
         face[vertices], barycentric[vertices] = its.in_own_corners(own.face[rows], own.barycentric[rows])
         confidence[vertices] = _confidence(own, work, other)[rows]
-        offsets[other] = float(own.offset @ mine.mesh.vertex_areas / mine.mesh.area) / work.diagonal
+        area = max(mine.mesh.area, np.finfo(float).tiny)
+        offsets[other] = float(own.offset @ mine.mesh.vertex_areas / area) / work.diagonal
     tell(0.9)
     _ride(work, main, face, barycentric, leader)
     return Whole(source, target, work.listed(offsets), face, barycentric, confidence, leader)
