@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy.typing as npt
 
 from ..stages import Part, Progress, Stages
-from ..surface.mesh import TriangleMesh
+from ..surface.mesh import MeshError, TriangleMesh
 from .alignment import Alignment
 from .completing import completed
 from .confidence import BOUND
 from .dense import bent_densely, drafted_from
 from .inside_out import turned_round
 from .landmarks import own_landmarks
+from .main_parts import other_mains
 from .mobius_map import roughly_aligned
 from .prepared import Surface
 from .reconsider import DOUBTFUL, reconsidered
@@ -59,18 +60,9 @@ def align(
     settings = settings or AlignSettings()
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
-    given = target = _surface(target_mesh, settings, settings.target_outer)
-    pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
-    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
-    if settings.refine == "dense":
-        part = clock.part(0.7, 0.95)
-        found = bent_densely(matched, drafted_from(matched, part), part, pairs)
-        other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
-        if other is not None:
-            found, target = other
-        elif not settings.take_rival and pairs is None:  # these decide
-            found = reconsidered(found, matched, clock.part(0.97, 0.98))
-    found = _with_other_parts(found, source, given, clock.part(0.98, 1))
+    target = _surface(target_mesh, settings, settings.target_outer)
+    found, source, target = _with_main_parts(source, target, settings, clock.part(0, 0.98), landmarks)
+    found = _with_other_parts(found, source, target, clock.part(0.98, 1))
     clock.end()
     others = found.whole is not None
     notes = (*source.notes_with(others), *target.notes_with(others), *(found.whole.notes if found.whole else ()))
@@ -81,11 +73,53 @@ def align(
     return found
 
 
+def _with_main_parts(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
+) -> tuple[Alignment, Surface, Surface]:
+    """Return the alignment of the main parts, and the surfaces with these: the largest, or others where these fit."""
+    named = settings.source_outer is not None or settings.target_outer is not None
+    alone = settings.parts == "main" or named
+    found = reason = None
+    try:
+        found = _of_main_parts(source, target, settings, clock.part(0.0, 0.9), landmarks)
+    except MeshError as error:  # as of what is closed
+        reason = error
+    if found is not None and (alone or found.mean_confidence > DOUBTFUL):
+        return found, source, target
+    for one, other in () if alone else other_mains(source, target):
+        try:
+            again = _of_main_parts(one, other, settings, clock.part(0.9, 1.0, "other parts"), landmarks)
+        except MeshError:
+            continue
+        if again.mean_confidence > DOUBTFUL:
+            said = "the largest parts do not belong together: others, which do, are taken for the main ones"
+            return replace(again, warnings=(said, *again.warnings)), one, other
+    if found is None:
+        assert reason is not None
+        raise reason
+    return found, source, target
+
+
+def _of_main_parts(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
+) -> Alignment:
+    """Return the alignment of the main parts of two surfaces."""
+    pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
+    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
+    if settings.refine == "dense":
+        part = clock.part(0.7, 0.95)
+        found = bent_densely(matched, drafted_from(matched, part), part, pairs)
+        other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
+        if other is not None:
+            found, _ = other
+        elif not settings.take_rival and pairs is None:  # these decide
+            found = reconsidered(found, matched, clock.part(0.97, 1))
+    return found
+
+
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:
     """Return the alignment with what belongs to what beyond the main parts, if that is asked for and there is more."""
-    if found.settings.parts == "main" or source.tidy is not None or target.tidy is not None:
-        return found
-    if not (source.largest_part and target.largest_part):
+    if found.settings.parts == "main" or not (source.largest_part and target.largest_part):
         return found
     clock.begin("parts", "Pairing parts", 0.0)
     return replace(found, whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))

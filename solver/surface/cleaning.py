@@ -69,7 +69,7 @@ def cleaned(
     return work.result()
 
 
-LEFT_OUT = ("smaller part left out", "smaller parts left out")
+LEFT_OUT = ("smaller part left out", "smaller parts left out", "other part left out", "other parts left out")
 """How what is said of other parts ends."""
 
 

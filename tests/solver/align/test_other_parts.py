@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from assembled import assembled, ball, card
 from scans import bumps, mirrored, similarity
+from surfaces import spherical_cap
 
 from solver import AlignSettings, Cleaned, TriangleMesh, align, correspond
 from solver.align.alignment import Alignment
@@ -209,3 +210,30 @@ def test_the_whole_way_with_no_setting() -> None:
     skin = slice(2 * first, None)
     assert (alone.face[skin] == correspondence.face[skin]).all()
     assert (alone.barycentric[skin] == correspondence.barycentric[skin]).all()
+
+
+def test_a_part_that_is_larger_than_the_skin_is_not_taken_for_it() -> None:
+    cape = spherical_cap(10, 1.4)[0]
+    cape = TriangleMesh(1.5 * cape.vertices - [0, 0, 2], cape.faces)
+    assert SKIN.area / 4 < cape.area
+    source = assembled(cape, SKIN, *eyes())
+    target = posed(assembled(OTHER_SKIN, *eyes()[::-1]))
+    found = align(source, target, AlignSettings(samples=60, targets=400, reflect="never"))
+    assert any("largest parts" in said for said in found.warnings)
+    assert found.whole is not None
+    assert found.whole.counts() == (3, 0, 1)
+    there = correspond(found)
+    reached = there.matrix() @ source.vertices
+    before = (target.vertices - SHIFT) @ TURN.T / SCALE
+    assert np.median(np.linalg.norm(reached - before, axis=1)) < 0.02
+
+
+def test_a_closed_part_that_is_larger_than_the_skin() -> None:
+    shell = ball((0, 0, -1), 0.8, rings=12)
+    found = align(
+        assembled(shell, SKIN, *eyes()),
+        posed(assembled(OTHER_SKIN, *eyes(), shell)),
+        AlignSettings(samples=60, targets=400, reflect="never"),
+    )
+    assert found.whole is not None
+    assert found.whole.counts() == (4, 0, 0)
