@@ -68,20 +68,21 @@ class _Near:
 
     @staticmethod
     def of(source: Part, target: Part, places: Floats) -> _Near:
-        size = np.sqrt(max(source.mesh.area, np.finfo(float).tiny))
+        size = _length(source.mesh)
         onto = TriangleMesh((source.mesh.vertices - _middle(source.mesh)) / size, source.mesh.faces)
         there = TriangleMesh(places, target.mesh.faces)
-        growth = 1 / np.sqrt(max(there.area, np.finfo(float).tiny))
+        growth = 1 / _length(there)
         own = TriangleMesh((places - _middle(there)) * growth, target.mesh.faces)
         if _runs_against(own, SurfacePoints(onto, (), NORMAL_WEIGHT)):
             own = TriangleMesh(own.vertices, own.faces[:, [0, 2, 1]])
-        return _Near(onto, own, float(size))
+        return _Near(onto, own, size)
 
     @property
     def bends(self) -> bool:
         """Whether there is something to bend, and not too much."""
         enough = min(len(self.target.faces), len(self.source.faces)) >= FEWEST
-        return enough and len(self.target.vertices) <= MOST
+        wide = min(self.target.area, self.source.area) > 0.5  # else it is a line, or a point
+        return enough and wide and len(self.target.vertices) <= MOST
 
     @property
     def extent(self) -> float:
@@ -153,6 +154,11 @@ def _together(meshes: list[TriangleMesh], shift: list[Floats]) -> TriangleMesh:
     faces = [mesh.faces + start for mesh, start in zip(meshes, first, strict=False)]
     vertices = [mesh.vertices + by for mesh, by in zip(meshes, shift, strict=True)]
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _length(mesh: TriangleMesh) -> float:
+    """Return the root of the area; of a line a thousandth of its length; 1 for a point."""
+    return float(np.sqrt(max(mesh.area, 1e-6 * mesh.diagonal**2))) or 1.0
 
 
 def _middle(mesh: TriangleMesh) -> Floats:

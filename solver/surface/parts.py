@@ -169,20 +169,20 @@ class Parts:
         A/12 (sum v v^T + s s^T).
         """
         good = self.of_face >= 0
-        label, area = self.of_face[good], self.mesh.face_areas[good]
-        origin = self.mesh.vertices[self.mesh.faces[np.flatnonzero(good)[0], 0]]
-        corner = self.mesh.vertices[self.mesh.faces[good]] - origin
-        total = corner.sum(axis=1)
-        square = np.einsum("mki,mkj->mij", corner, corner) + total[:, :, None] * total[:, None, :]
-        share = np.maximum(self.area, np.finfo(float).tiny)[:, None]
+        label = self.of_face[good]
+        # faces without area count alike where there are no others
+        weight = np.where(self.area[label] > 0, self.mesh.face_areas[good], 1.0)
+        total = np.bincount(label, weight, len(self))[:, None]
 
-        def sums(values: Floats) -> Floats:
-            columns = [np.bincount(label, area * column, len(self)) for column in values.T]
-            return np.stack(columns, axis=1) / share
+        def means(values: Floats) -> Floats:
+            return np.stack([np.bincount(label, weight * column, len(self)) for column in values.T], axis=1) / total
 
-        centre = sums(total / 3)
-        about = sums(square.reshape(-1, 9) / 12).reshape(-1, 3, 3) - centre[:, :, None] * centre[:, None, :]
-        return centre + origin, about
+        corner = self.mesh.vertices[self.mesh.faces[good]]
+        centre = means(corner.mean(axis=1))
+        corner = corner - centre[label, None]
+        along = corner.sum(axis=1)
+        square = np.einsum("mki,mkj->mij", corner, corner) + along[:, :, None] * along[:, None, :]
+        return centre, means(square.reshape(-1, 9) / 12).reshape(-1, 3, 3)
 
     @cached_property
     def shape(self) -> Integers:

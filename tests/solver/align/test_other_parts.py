@@ -151,10 +151,12 @@ def test_a_source_without_parts_and_a_target_without() -> None:
 
 def test_debris_of_one_triangle_and_less_breaks_nothing() -> None:
     crumbs = [TriangleMesh([[x, 0, 0.5], [x + 1e-3, 0, 0.5], [x, 1e-3, 0.5]], [[0, 1, 2]]) for x in (-0.3, 0.0, 0.2)]
+    crumbs.append(TriangleMesh([[0, 0, 0.6], [1e-9, 0, 0.6], [0, 1e-9, 0.6]], [[0, 1, 2]]))
+    crumbs.append(TriangleMesh([[0.3, 0.3, 0.6]] * 3, [[0, 1, 2]]))
     line = TriangleMesh([[0, 0.5, 0.5], [0.1, 0.5, 0.5], [0.2, 0.5, 0.5]], [[0, 1, 2]])
     here, there = [*eyes(), *crumbs, line], [*crumbs, *eyes(), line]
     found = paired(whole(here, there), here, there)
-    assert [found[k] for k in (3, 4)] == [0, 1]
+    assert [found[k] for k in (5, 6)] == [0, 1]
 
 
 def test_shells_that_lie_in_each_other_are_paired_one_to_one() -> None:
