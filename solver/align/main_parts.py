@@ -29,6 +29,8 @@ def other_mains(source: Surface, target: Surface) -> list[tuple[Surface, Surface
 
 
 def _with_other_mains(surface: Surface) -> list[Surface]:
+    if surface.within is not None:
+        return []
     try:
         parts, found = surface.parts, []
     except MeshError:  # which is said elsewhere

@@ -12,6 +12,7 @@ from ..surface.mesh import MeshError, TriangleMesh
 from .alignment import Alignment
 from .completing import completed
 from .confidence import BOUND
+from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
 from .inside_out import turned_round
 from .landmarks import own_landmarks
@@ -61,11 +62,12 @@ def align(
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
     target = _surface(target_mesh, settings, settings.target_outer)
-    found, source, target = _with_main_parts(source, target, settings, clock.part(0, 0.98), landmarks)
+    found, (source, target), used = _with_main_parts(source, target, settings, clock.part(0, 0.98), landmarks)
     found = _with_other_parts(found, source, target, clock.part(0.98, 1))
     clock.end()
     others = found.whole is not None
-    notes = (*source.notes_with(others), *target.notes_with(others), *(found.whole.notes if found.whole else ()))
+    notes = [said for surface in used for said in surface.notes_with(others)]
+    notes += found.whole.notes if found.whole else ()
     found = replace(found, seconds=clock.seconds, warnings=(*notes, *found.warnings))
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
@@ -73,10 +75,16 @@ def align(
     return found
 
 
+_Both = tuple[Surface, Surface]
+
+
 def _with_main_parts(
     source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
-) -> tuple[Alignment, Surface, Surface]:
-    """Return the alignment of the main parts, and the surfaces with these: the largest, or others where these fit."""
+) -> tuple[Alignment, _Both, _Both]:
+    """Return the alignment of the main parts, the surfaces with these, and what was used of them.
+
+    The main parts are the largest, or others where these fit.
+    """
     named = settings.source_outer is not None or settings.target_outer is not None
     alone = settings.parts == "main" or named
     found = reason = None
@@ -84,37 +92,38 @@ def _with_main_parts(
         found = _of_main_parts(source, target, settings, clock.part(0.0, 0.9), landmarks)
     except MeshError as error:  # as of what is closed
         reason = error
-    if found is not None and (alone or found.mean_confidence > DOUBTFUL):
-        return found, source, target
+    if found is not None and (alone or found[0].mean_confidence > DOUBTFUL):
+        return found[0], (source, target), found[1]
     for one, other in () if alone else other_mains(source, target):
         try:
-            again = _of_main_parts(one, other, settings, clock.part(0.9, 1.0, "other parts"), landmarks)
+            again, used = _of_main_parts(one, other, settings, clock.part(0.9, 1.0, "other parts"), landmarks)
         except MeshError:
             continue
         if again.mean_confidence > DOUBTFUL:
             said = "the largest parts do not belong together: others, which do, are taken for the main ones"
-            return replace(again, warnings=(said, *again.warnings)), one, other
+            return replace(again, warnings=(said, *again.warnings)), (one, other), used
     if found is None:
         assert reason is not None
         raise reason
-    return found, source, target
+    return found[0], (source, target), found[1]
 
 
 def _of_main_parts(
     source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
-) -> Alignment:
-    """Return the alignment of the main parts of two surfaces."""
+) -> tuple[Alignment, _Both]:
+    """Return the alignment of the main parts of two surfaces, or of a piece of one of them, and what was aligned."""
+    source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.1))
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
-    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
+    found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
     if settings.refine == "dense":
         part = clock.part(0.7, 0.95)
         found = bent_densely(matched, drafted_from(matched, part), part, pairs)
         other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
         if other is not None:
-            found, _ = other
+            found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, clock.part(0.97, 1))
-    return found
+    return replace(found, warnings=(*said, *found.warnings)), (source, target)
 
 
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:

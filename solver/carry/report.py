@@ -12,14 +12,16 @@ from ..align.whole import Whole
 from ..mobius import Mobius
 from ..surface.mesh import Booleans
 from ..surface.parts import Parts
+from ..surface.tidy import Cleaned
 from .correspond import Correspondence
 
 
 def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, Any]:
     """Return the figures of an alignment as JSON-ready data: what was matched, what is proved, how long it took.
 
-    `coverage` is the share of the target's area whose vertices are matched. `value` to `rival` are about the whole
-    discs, `overlap` about the parts that both surfaces show, where these are less; `rival_margin` is the latter's then.
+    `coverage` is the share of the target's area whose vertices are matched, `cut_to` the shares that were aligned of
+    surfaces of which a piece was cut out. `value` to `rival` are about the whole discs, `overlap` about the parts that
+    both surfaces show, where these are less; `rival_margin` is the latter's then.
     `parts` has a row for each part of the meshes, if there are several: what it is on either side (null: no
     counterpart), how certain the pair is, and how far apart they remain, in diagonals of the source.
     """
@@ -48,6 +50,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         if alignment.rival is None
         else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
         "rival_margin": decisive.rival_margin,
+        "cut_to": {"source": _share(alignment.source_cleaned), "target": _share(tidy)},
         "overlap": None
         if parts is None
         else {
@@ -61,7 +64,8 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         },
         "parts": _parts(alignment.whole, correspondence),
         "vertices_unfolded": None if decisive.bending is None else decisive.bending.repaired,
-        "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
+        "coverage": float(areas[correspondence.matched].sum() / areas.sum())
+        * (1.0 if alignment.whole else _share(tidy)),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
         "flips_repaired": {"source": alignment.source.flips_repaired, "target": alignment.target.flips_repaired},
@@ -80,13 +84,13 @@ def _parts(whole: Whole | None, correspondence: Correspondence) -> list[dict[str
             "target": _part(whole.target, pair.target),
             "certainty": pair.certainty,
             "offset": pair.offset,
-            "matched": None if pair.target is None else _share(correspondence, whole.target.of_vertex == pair.target),
+            "matched": None if pair.target is None else _matched(correspondence, whole.target.of_vertex == pair.target),
         }
         for pair in whole.pairs
     ]
 
 
-def _share(correspondence: Correspondence, of_part: Booleans) -> float:
+def _matched(correspondence: Correspondence, of_part: Booleans) -> float:
     """Return which share of a part's vertices is matched; 0 where all of them count as another part's."""
     return float(correspondence.matched[of_part].sum() / max(int(of_part.sum()), 1))
 
@@ -102,6 +106,11 @@ def _part(parts: Parts, number: int | None) -> dict[str, Any] | None:
         "vertices": len(own),
         "area": float(parts.area[number] / parts.area.sum()),
     }
+
+
+def _share(tidy: Cleaned | None) -> float:
+    """Return the share of the whole that was aligned, where that is a piece that was cut out."""
+    return 1.0 if tidy is None else tidy.share
 
 
 def _plain(mobius: Mobius) -> dict[str, Any]:
