@@ -12,6 +12,7 @@ import numpy as np
 
 from ..solver import Correspondence, TriangleMesh
 from ..solver.align.confidence import BOUND
+from ..solver.carry.parts import pieces
 from ..solver.surface.mesh import Floats, Integers
 from ..solver.surface.nearest import SurfacePoints
 from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface, seen_positions
@@ -78,6 +79,7 @@ class Shown:
             confidence=np.where(face >= 0, found.confidence, 0.0),
             source_triangles=self.surface.mesh.faces,
             source_size=len(self.origin),
+            source_part=None if found.source_part is None else pieces(self.surface.mesh.faces, len(self.origin)),
         )
 
 

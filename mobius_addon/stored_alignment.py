@@ -43,6 +43,11 @@ def store(
         barycentric=correspondence.barycentric,
         matched=correspondence.matched,
         confidence=correspondence.confidence.astype(np.float32),
+        **{
+            name: found.astype(np.int32)
+            for name in ("part", "source_part", "leader")
+            if (found := getattr(correspondence, name)) is not None
+        },
     )
     kept = target.data.mobius_alignment
     kept.property_unset("source")  # of an earlier version
@@ -123,6 +128,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
         confidence=arrays["confidence"].astype(np.float64),
         source_triangles=source_surface.mesh.faces,
         source_size=len(source_surface.mesh.vertices),
+        **{name: arrays[name].astype(np.intp) for name in ("part", "source_part", "leader") if name in arrays},
     )
 
 

@@ -17,6 +17,7 @@ from ...solver.carry.elements import edges_in_reach, source_of_corners, source_o
 from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.carry.frames import local_similarities
 from ...solver.carry.gradients import GradientTransfer
+from ...solver.carry.parts import drawn_apart, without_riders
 from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
 
@@ -40,6 +41,8 @@ class Carrier:
         each by the "frames" around its vertex (`local_similarities`).
     contacts : bool
         What a displacement brings together on the source, as lids and lips, is brought together too; by gradients only.
+    own_parts : bool
+        Whether a gap gets nothing from another part of the target.
     """
 
     correspondence: Correspondence
@@ -48,6 +51,14 @@ class Carrier:
     gap: Literal["leave", "nearest", "fill"] = "leave"
     keys_by: Literal["gradients", "frames"] = "gradients"
     contacts: bool = True
+    own_parts: bool = False
+
+    @cached_property
+    def own(self) -> Carrier:
+        """Who carries what is a part's own, as UV maps and materials: nothing to parts without a counterpart."""
+        if self.correspondence.leader is None:
+            return self
+        return replace(self, correspondence=without_riders(self.correspondence), own_parts=True)
 
     def points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per vertex, (n_source, ...), linearly.
@@ -133,7 +144,7 @@ class Carrier:
         if values.dtype == object or marked.mean() > 0.3:
             return values[self._edge_origin], covered
         # few edges are marked, as seams are: look closer only beside these
-        found, places, edges = self.correspondence, self.source.mesh.vertices, self.source.edges
+        found, places, edges = self.correspondence, self._source_places, self.source.edges
         near = np.flatnonzero(edges_in_reach(found, places, edges, marked, self.target.edges))
         result = np.zeros((len(covered), *values.shape[1:]), values.dtype)
         result[near] = values[source_of_edges(found, places, edges, self.target.edges[near])]
@@ -195,13 +206,18 @@ class Carrier:
         return self._nearest >= 0 if self.gap == "nearest" else self._fill.reached
 
     @cached_property
+    def _source_places(self) -> Floats:
+        """Positions of the source's vertices, (n_source, 3), to look for what is near in the same part."""
+        return drawn_apart(self.correspondence, self.source.mesh.vertices, self.target.mesh.faces)
+
+    @cached_property
     def _matrix(self) -> csr_array:
         return self.correspondence.matrix()
 
     @cached_property
     def _corner_interpolation(self) -> CornerInterpolation:
         return CornerInterpolation(
-            self.correspondence, self.source.mesh.vertices, self.target.mesh.faces, self._polygon_of_triangle
+            self.correspondence, self._source_places, self.target.mesh.faces, self._polygon_of_triangle
         )
 
     @cached_property
@@ -210,7 +226,14 @@ class Carrier:
 
     @cached_property
     def _nearest(self) -> Integers:
-        return nearest_known(self.target.mesh, self.correspondence.face >= 0)
+        return self._nearest_of(self.correspondence.face >= 0)
+
+    def _nearest_of(self, known: Booleans) -> Integers:
+        """Return the nearest of the known vertices, (n_target,), for each one, -1: none."""
+        nearest, part = nearest_known(self.target.mesh, known), self.correspondence.part
+        if not self.own_parts or part is None:
+            return nearest
+        return np.where((nearest >= 0) & (part[nearest] == part), nearest, -1)
 
     @cached_property
     def _nearest_corner(self) -> Integers:
@@ -221,7 +244,7 @@ class Carrier:
             return np.where(whole, own, -1)
         corner_at = np.full(len(self.correspondence.face), -1)
         corner_at[vertex[whole]] = own[whole]
-        nearest = nearest_known(self.target.mesh, corner_at >= 0)
+        nearest = self._nearest_of(corner_at >= 0)
         return np.where(whole, own, np.where(nearest < 0, -1, corner_at[nearest])[vertex])
 
     @cached_property
@@ -256,7 +279,7 @@ class Carrier:
     @cached_property
     def _polygon_origin(self) -> Integers:
         triangle = source_of_faces(
-            self.correspondence, self.source.mesh.vertices, self.target.mesh.faces, self._polygon_of_triangle
+            self.correspondence, self._source_places, self.target.mesh.faces, self._polygon_of_triangle
         )
         polygon = self.source.corner_polygon[self.source.triangle_corners[triangle, 0]]
         return np.where((triangle >= 0) & self._whole_polygons, polygon, -1)
@@ -264,7 +287,7 @@ class Carrier:
     @cached_property
     def _corner_origin(self) -> Integers:
         corner = source_of_corners(
-            self.correspondence, self.source.mesh.vertices, self.target.mesh.faces, self._polygon_of_triangle
+            self.correspondence, self._source_places, self.target.mesh.faces, self._polygon_of_triangle
         )
         result = np.full(len(self.target.corner_vertex), -1)
         origin = np.where(corner < 0, -1, self.source.triangle_corners.ravel()[corner])
@@ -273,4 +296,4 @@ class Carrier:
 
     @cached_property
     def _edge_origin(self) -> Integers:
-        return source_of_edges(self.correspondence, self.source.mesh.vertices, self.source.edges, self.target.edges)
+        return source_of_edges(self.correspondence, self._source_places, self.source.edges, self.target.edges)

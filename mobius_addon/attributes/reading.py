@@ -26,7 +26,7 @@ from .plan import Carried, Transfer
 from .record import Written, unedited
 from .settings import TransferSettings
 from .shape_keys import ShapeKeyAccess, limited
-from .table import KINDS, ROWS, Row
+from .table import KINDS, RIDING, ROWS, Row
 from .unmatched import Unmatched
 from .vertex_groups import read_weights
 from .weights import tidied
@@ -229,6 +229,7 @@ def read_transfer(
         if row.kind in settings.kinds:
             keys = row.kind == "shape-keys"
             whence, way = (source, along_keys) if keys else (shown_source or source, carrier)
+            way = way if row.kind in RIDING else way.own
             layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
             if keys and not _groups_come_along(settings, shown_source):
                 layers = [limited(layer) for layer in layers]

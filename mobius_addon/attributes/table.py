@@ -59,6 +59,9 @@ KINDS = (
     ),
 )
 
+RIDING = frozenset({"vertex-groups", "shape-keys"})
+"""Kinds that move a part which rides along with another's surface; everything else is each part's own."""
+
 NOUNS = {kind.identifier: kind.noun for kind in KINDS}
 """What kinds are called within a sentence, by identifier."""
 

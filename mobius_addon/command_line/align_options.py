@@ -39,6 +39,11 @@ def _add_align_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--reflect", choices=("auto", "never", "always"), help="is one the mirror image of the other?")
     group.add_argument("--refine", choices=("dense", "mobius", "none"), help="what follows the proven map")
     group.add_argument(
+        "--parts",
+        choices=("all", "main"),
+        help="of meshes with several: all of them, each from its counterpart (default), or the largest ones alone",
+    )
+    group.add_argument(
         "--take-rival", action="store_true", default=None, help="of an ambiguous pair, the best map but one"
     )
     group.add_argument(
@@ -61,7 +66,7 @@ def align_settings(options: argparse.Namespace) -> AlignSettings:
     from ..files import Unreadable
 
     names = ("reflect", "refine", "take_rival", "samples", "targets", "radius", "z_max", "time_limit")
-    names += ("fill_holes", "cut", "source_outer", "target_outer")
+    names += ("parts", "fill_holes", "cut", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "time_limit" in given:
         given["time_limit"] = given["time_limit"] or None

@@ -32,7 +32,7 @@ def add_repair_options(group: argparse._ArgumentGroup) -> None:
         "--largest-part",
         action="store_true",
         default=True,
-        help="leave all separate parts but the one of largest area out of it: what happens anyway",
+        help="begin with the part of largest area: what happens anyway",
     )
     parts.add_argument("--keep-parts", dest="largest_part", action="store_false", help="refuse a mesh of several parts")
 

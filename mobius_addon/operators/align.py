@@ -199,7 +199,10 @@ def write_alignment(
     results.write_color(target, SHARED_COLOR, solver.interpolate(correspondence, color), correspondence.face >= 0)
     matched = np.where(correspondence.matched, correspondence.confidence, 0.0)
     results.write_group(target, MATCHED_GROUP, matched)
-    group = on_source(surfaces[0].mesh, here.vertex_of >= 0, correspondence, matched)
+    used = here.vertex_of >= 0
+    if (whole := alignment.whole) is not None:
+        used |= np.isin(whole.source.of_vertex, [x.source for x in whole.pairs if x.source and x.target is not None])
+    group = on_source(surfaces[0].mesh, used, correspondence, matched)
     results.write_group(source, MATCHED_GROUP, group)
 
 
@@ -227,8 +230,12 @@ def summary(source: str, target: str, alignment: solver.Alignment, correspondenc
     if (overlap := alignment.overlap) is not None:
         proven = _proof(overlap.alignment)
         share = f"; in the {overlap.target_share:.0%} of the target that the source shows too {proven}"
+    parts = ""
+    if alignment.whole is not None:
+        paired, bare, _ = alignment.whole.counts()
+        parts = f"; {paired:,} of {paired + bare:,} parts have a counterpart"
     return (
-        f"'{source}' on '{target}'{mirrored}: {_proof(alignment)}{margin}{share}; "
+        f"'{source}' on '{target}'{mirrored}: {_proof(alignment)}{margin}{share}{parts}; "
         f"{correspondence.matched.mean():.0%} of the vertices matched"
     )
 

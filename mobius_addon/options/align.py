@@ -34,6 +34,15 @@ class AlignOptions:
         ),
         default=_DEFAULTS.refine,
     )
+    parts: bpy.props.EnumProperty(
+        name="Parts",
+        description="Which parts of meshes that have several are aligned",
+        items=(
+            ("all", "All", "Every part, as eyes, teeth and lashes, with its counterpart on the other mesh"),
+            ("main", "Largest", "Only the largest part of each mesh"),
+        ),
+        default=_DEFAULTS.parts,
+    )
     landmarks: bpy.props.EnumProperty(
         name="Landmarks",
         description="Pairs of points that are known; a few wrong ones do no harm",

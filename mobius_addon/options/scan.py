@@ -30,7 +30,7 @@ class ScanOptions:
     )
     largest_part: bpy.props.BoolProperty(
         name="Largest Part",
-        description="Leave all separate parts but the one of largest area out of the computation",
+        description="Begin with the part of largest area. Without it, a mesh of several parts is refused",
         default=True,
     )
 

@@ -68,6 +68,9 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
             (iface_("Shared Target"), f"{parts['target_share']:.0%}"),
             (iface_("Value There"), iface_("{:.2f} of {:.2f}").format(parts["value"], parts["upper_bound"])),
         ]
+    if several := found.get("parts"):
+        paired = sum(bool(pair["source"] and pair["target"]) for pair in several)
+        rows.append((iface_("Parts"), iface_("{:,} of {:,}").format(paired, sum(bool(x["target"]) for x in several))))
     rows.append((iface_("Time"), iface_("{:.1f} s").format(sum(found["seconds"].values()))))
     return rows
 

@@ -20,6 +20,7 @@ from .confidence import evidence, probability, unmatched_share
 from .objective import usual_difference
 from .overlap import Piece
 from .settings import AlignSettings
+from .whole import Whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,9 @@ class Alignment:
         The best transformation that maps everything elsewhere; None if it was not searched for.
     taken : Rival or None
         Which rival was gone on with in place of the search's best; None: the best.
+    whole : Whole or None
+        The other parts of the meshes and what belongs to what there; all else here is about the main parts. None if
+        there are no others, or were not asked.
     seconds : dict of str to float
         Wall-clock time per stage.
     warnings : tuple of str
@@ -80,6 +84,7 @@ class Alignment:
     other: SearchResult | None = None
     rival: Rival | None = None
     taken: Rival | None = None
+    whole: Whole | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     causes: tuple[str, ...] = ()

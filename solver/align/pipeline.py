@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy.typing as npt
 
-from ..stages import Progress, Stages
-from ..surface.mesh import TriangleMesh
+from ..stages import Part, Progress, Stages
+from ..surface.mesh import MeshError, TriangleMesh
 from .alignment import Alignment
+from .completing import completed
 from .confidence import BOUND
 from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
 from .diagnosis import causes, coarse
 from .inside_out import turned_round
 from .landmarks import own_landmarks
+from .main_parts import other_mains
 from .mobius_map import roughly_aligned
 from .prepared import Surface
 from .reconsider import DOUBTFUL, reconsidered
@@ -61,6 +63,60 @@ def align(
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
     target = _surface(target_mesh, settings, settings.target_outer)
+    found, (source, target), used = _with_main_parts(source, target, settings, clock.part(0, 0.98), landmarks)
+    found = _with_other_parts(found, source, target, clock.part(0.98, 1))
+    clock.end()
+    others = found.whole is not None
+    notes = [said for surface in used for said in surface.notes_with(others)]
+    notes += found.whole.notes if found.whole else ()
+    found = replace(found, seconds=clock.seconds, warnings=(*notes, *found.warnings))
+    if found.mean_confidence <= DOUBTFUL:
+        said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
+        known = causes(found, *used)
+        likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
+        kinds = tuple(cause.kind for cause in known)
+        return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
+    cause = coarse(found)
+    return found if cause is None else replace(found, warnings=(*found.warnings, cause.text), causes=(cause.kind,))
+
+
+_Both = tuple[Surface, Surface]
+
+
+def _with_main_parts(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
+) -> tuple[Alignment, _Both, _Both]:
+    """Return the alignment of the main parts, the surfaces with these, and what was used of them.
+
+    The main parts are the largest, or others where these fit.
+    """
+    named = settings.source_outer is not None or settings.target_outer is not None
+    alone = settings.parts == "main" or named
+    found = reason = None
+    try:
+        found = _of_main_parts(source, target, settings, clock.part(0.0, 0.9), landmarks)
+    except MeshError as error:  # as of what is closed
+        reason = error
+    if found is not None and (alone or found[0].mean_confidence > DOUBTFUL):
+        return found[0], (source, target), found[1]
+    for one, other in () if alone else other_mains(source, target):
+        try:
+            again, used = _of_main_parts(one, other, settings, clock.part(0.9, 1.0, "other parts"), landmarks)
+        except MeshError:
+            continue
+        if again.mean_confidence > DOUBTFUL:
+            said = "the largest parts do not belong together: others, which do, are taken for the main ones"
+            return replace(again, warnings=(said, *again.warnings)), (one, other), used
+    if found is None:
+        assert reason is not None
+        raise reason
+    return found[0], (source, target), found[1]
+
+
+def _of_main_parts(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
+) -> tuple[Alignment, _Both]:
+    """Return the alignment of the main parts of two surfaces, or of a piece of one of them, and what was aligned."""
     source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.1))
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
     found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
@@ -72,17 +128,15 @@ def align(
             found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, clock.part(0.97, 1))
-    clock.end()
-    warnings = (*said, *source.notes, *target.notes, *found.warnings)
-    found = replace(found, seconds=clock.seconds, warnings=warnings)
-    if found.mean_confidence <= DOUBTFUL:
-        said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
-        known = causes(found, source, target)
-        likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
-        kinds = tuple(cause.kind for cause in known)
-        return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
-    cause = coarse(found)
-    return found if cause is None else replace(found, warnings=(*found.warnings, cause.text), causes=(cause.kind,))
+    return replace(found, warnings=(*said, *found.warnings)), (source, target)
+
+
+def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:
+    """Return the alignment with what belongs to what beyond the main parts, if that is asked for and there is more."""
+    if found.settings.parts == "main" or not (source.largest_part and target.largest_part):
+        return found
+    clock.begin("parts", "Pairing parts", 0.0)
+    return replace(found, whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
 
 
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:

@@ -13,10 +13,11 @@ import numpy as np
 
 from ..flatten.flatten import Flattening, flatten
 from ..stages import Progress, Stages
-from ..surface.cleaning import cleaned
+from ..surface.cleaning import LEFT_OUT, cleaned
 from ..surface.descriptors import diffused_curvatures
 from ..surface.fairing import faired
 from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, plural
+from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
 from ..surface.tidy import Cleaned, piece_within
@@ -94,6 +95,11 @@ class Surface:
         return Surface(self.original, fill_holes=self.fill_holes, keys=self.keys, tidy=self.cleaned.only(chosen, said))
 
     @cached_property
+    def parts(self) -> Parts:
+        """All parts of the mesh as it was given, the one that is in order first."""
+        return Parts.of(self.original, self.cleaned, self.keys)
+
+    @cached_property
     def flattening(self) -> Flattening:
         """Of the mesh in order, made fair where it is rough; raises `MeshError`, as for what is too long for a disc."""
         outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
@@ -150,14 +156,19 @@ class Surface:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
+        return self.notes_with(other_parts=False)
+
+    def notes_with(self, other_parts: bool) -> tuple[str, ...]:
+        """Return `notes`, without a word about smaller parts if these are aligned too."""
         rough = f"'{self.mesh.name}' is rough or noisy: smoothed, for the computation only"
         smoothed = (rough,) if self.mesh is not self.cleaned.mesh else ()
-        return (*cleaning_notes(self.cleaned), *smoothed, *flattening_notes(self.flattening))
+        return (*cleaning_notes(self.cleaned, other_parts), *smoothed, *flattening_notes(self.flattening))
 
 
-def cleaning_notes(tidy: Cleaned) -> tuple[str, ...]:
-    """Say what was put in order for the computation."""
-    return (f"'{tidy.mesh.name}': {', '.join(tidy.changes)}, for the computation only",) if tidy.changes else ()
+def cleaning_notes(tidy: Cleaned, other_parts: bool = False) -> tuple[str, ...]:
+    """Say what was put in order for the computation; not what of it was left out, if `other_parts` are aligned too."""
+    changes = [said for said in tidy.changes if not (other_parts and said.endswith(LEFT_OUT))]
+    return (f"'{tidy.mesh.name}': {', '.join(changes)}, for the computation only",) if changes else ()
 
 
 def flattening_notes(found: Flattening) -> tuple[str, ...]:

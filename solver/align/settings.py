@@ -39,6 +39,9 @@ class AlignSettings:
     refine : str
         "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
         the source, smoothly and without folds.
+    parts : str
+        "all": the smaller parts of the meshes, too, are paired and aligned, each with its counterpart; "main": only
+        the largest ones.
     fill_holes : bool
         Allow meshes with openings and handles: all boundary loops but the outer one are closed for the computation, and
         small handles cut and closed. Without it such a mesh is refused.
@@ -59,13 +62,18 @@ class AlignSettings:
     time_limit: float | None = 60.0
     threads: int | None = None
     refine: str = "dense"
+    parts: str = "all"
     fill_holes: bool = True
     cut: bool = True
     source_outer: int | None = None
     target_outer: int | None = None
 
     def __post_init__(self) -> None:
-        for name, allowed in (("reflect", ("never", "always", "auto")), ("refine", ("none", "mobius", "dense"))):
+        for name, allowed in (
+            ("reflect", ("never", "always", "auto")),
+            ("refine", ("none", "mobius", "dense")),
+            ("parts", ("all", "main")),
+        ):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{getattr(self, name)}'")
         if self.samples < 3 or self.targets < 3:

@@ -51,6 +51,8 @@ def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn:
     stiffness, force = _along(normal, weight), (weight * distance)[:, None] * normal
     rim = np.unique(mesh.edges[np.bincount(mesh.edge_of_side, minlength=len(mesh.edges)) == 1])
     rim = rim[drawn[rim]]
+    if not len(rim):
+        return stiffness, force
     point, tangent = onto.nearest_on_boundary(x[rim])
     weight = areas[rim] * np.exp(-(((point - x[rim]) ** 2).sum(axis=1) / RIM_REACH**2) / 2)
     across = weight[:, None, None] * np.eye(3) - _along(tangent, weight * (1 - SLIP))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ..align.alignment import Alignment
+from ..align.whole import Whole
 from ..flatten.flatten import Flattening
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
 from ..surface.tidy import Cleaned
@@ -32,6 +33,13 @@ class Correspondence:
         Vertex indices of the source's triangles.
     source_size : int
         Number of source vertices.
+    part : (n,) int or None
+        The part of the target that each vertex is in, the main one 0; -1 in no face. None: there is one part.
+    source_part : (n_source,) int or None
+        The same of the source.
+    leader : (n,) int or None
+        Vertices of parts without a counterpart ride along: they have the point of the surface next to them, which moves
+        them and no more, and here the vertex of that surface in whose frame they are moved; -1 at others.
     """
 
     face: Integers
@@ -40,6 +48,9 @@ class Correspondence:
     confidence: Floats
     source_triangles: Integers
     source_size: int
+    part: Integers | None = None
+    source_part: Integers | None = None
+    leader: Integers | None = None
 
     def matrix(self) -> csr_array:
         """Return the sparse (n_target, n_source) matrix that carries values at source vertices; rows sum to 1, or 0."""
@@ -68,13 +79,30 @@ def correspond(alignment: Alignment) -> Correspondence:
     if (tidy := alignment.target_cleaned) is not None and tidy.changes:
         face, barycentric = tidy.at_vertices(face, -1), tidy.at_vertices(barycentric, 0)
         confidence = tidy.at_vertices(confidence, 0)
-    return Correspondence(
+    found = Correspondence(
         face=face,
         barycentric=barycentric,
         matched=confidence >= 0.5,
         confidence=confidence,
         source_triangles=triangles,
         source_size=size,
+    )
+    return found if alignment.whole is None else _of_all_parts(found, alignment.whole)
+
+
+def _of_all_parts(main: Correspondence, whole: Whole) -> Correspondence:
+    """Return a correspondence of the main parts with those of the others."""
+    others = whole.face >= 0
+    confidence = np.where(others, whole.confidence, main.confidence)
+    return replace(
+        main,
+        face=np.where(others, whole.face, main.face),
+        barycentric=np.where(others[:, None], whole.barycentric, main.barycentric),
+        matched=confidence >= 0.5,
+        confidence=confidence,
+        part=whole.target.of_vertex,
+        source_part=whole.source.of_vertex,
+        leader=whole.leader,
     )
 
 

@@ -22,7 +22,8 @@ def local_similarities(
 
     The orthogonal matrix is the one that turns the sides of the triangles around a vertex, and the normal, best from
     the source onto the target (Kabsch 1976); a reflection everywhere if the map mirrors the surface, else nowhere.
-    The scale is the ratio of the lengths of those sides. Both are the identity where no triangle is known whole.
+    The scale is the ratio of the lengths of those sides. A vertex that rides along has its leader's. Both are the
+    identity where no triangle is known whole.
 
     With a `reach`, in length units of the target, what is best is so for all that lies around within about that
     distance on the surface: sums over vertices are diffused by one implicit step of that length.
@@ -49,6 +50,9 @@ def local_similarities(
     rotation[known] = nearest_orthogonal(wanted)
     scale = np.ones(size)
     scale[known] = np.sqrt(here_square[known] / there_square[known])
+    if (leader := correspondence.leader) is not None:
+        riders = np.flatnonzero(leader >= 0)
+        rotation[riders], scale[riders] = rotation[leader[riders]], scale[leader[riders]]
     return rotation, scale
 
 

@@ -24,6 +24,9 @@ _FIELDS = {
 }
 """Kinds of numpy types and the shape of each array that is read; equal letters stand for equal lengths."""
 
+_OF_PARTS = {"part": ("i", ("n",)), "source_part": ("i", ("k",)), "leader": ("i", ("n",))}
+"""The same of what meshes of several parts have; all or none."""
+
 _HEADER = 512
 """Bytes that hold the header of any of these arrays."""
 
@@ -42,7 +45,8 @@ def save_map(
 
     Arrays: face (n_target,) int, barycentric (n_target, 3), matched (n_target,) bool, confidence (n_target,),
     source_triangles (m, 3) int, source_size, source_fingerprint and target_fingerprint (text), source_disc and
-    target_disc complex, z complex, theta, reflected.
+    target_disc complex, z complex, theta, reflected; of meshes with several parts also part (n_target,), source_part
+    (n_source,) and leader (n_target,) int, as of `Correspondence`. The discs are of the main parts.
 
     Parameters
     ----------
@@ -75,6 +79,7 @@ def save_map(
             z=alignment.mobius.z,
             theta=alignment.mobius.theta,
             reflected=alignment.mobius.reflected,
+            **{name: found for name in _OF_PARTS if (found := getattr(correspondence, name)) is not None},
         )
 
 
@@ -100,8 +105,9 @@ def load_map(
     with Path(path).open("rb") as file:
         try:
             with zipfile.ZipFile(file) as archive:
-                _require_fitting(archive, path, source, target)
-                arrays = {name: _read(archive, name) for name in _FIELDS}
+                fields = _FIELDS | (_OF_PARTS if "part.npy" in archive.namelist() else {})
+                _require_fitting(archive, fields, path, source, target)
+                arrays = {name: _read(archive, name) for name in fields}
         except _UnfitError:
             raise
         except Exception as error:  # damage makes the decoders raise a dozen kinds
@@ -115,6 +121,7 @@ def load_map(
         confidence=arrays["confidence"].astype(np.float64),
         source_triangles=arrays["source_triangles"].astype(np.intp),
         source_size=int(arrays["source_size"]),
+        **{name: arrays[name].astype(np.intp) for name in _OF_PARTS if name in arrays},
     )
 
 
@@ -123,7 +130,11 @@ class _UnfitError(ValueError):
 
 
 def _require_fitting(
-    archive: zipfile.ZipFile, path: Path | str, source: TriangleMesh | None, target: TriangleMesh | None
+    archive: zipfile.ZipFile,
+    fields: dict[str, tuple[str, tuple[Any, ...]]],
+    path: Path | str,
+    source: TriangleMesh | None,
+    target: TriangleMesh | None,
 ) -> None:
     """Refuse a map of wrong types or shapes, of any size that is not its own, or of other meshes; unpack nothing yet.
 
@@ -132,7 +143,7 @@ def _require_fitting(
     _UnfitError
     """
     lengths: dict[str, int] = {}
-    for name, (kinds, shape) in _FIELDS.items():
+    for name, (kinds, shape) in fields.items():
         found, dtype, size = _header(archive, name)
         if dtype.kind not in kinds or len(found) != len(shape):
             raise _UnfitError(f"'{path}' is damaged: '{name}' is an array of {dtype} and shape {found}")
@@ -203,4 +214,9 @@ def _damage(arrays: dict[str, npt.NDArray[Any]]) -> str | None:
         return "a confidence outside 0 to 1"
     if (arrays["matched"] & ~located).any():
         return "a vertex is matched with no point"
+    if "part" in arrays:
+        if len(arrays["source_part"]) != size:
+            return "its parts are of another source"
+        if any(arrays[name].min(initial=0) < -1 for name in _OF_PARTS) or arrays["leader"].max() >= len(face):
+            return "a vertex is in a part, or rides with a vertex, that is not there"
     return None

@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from ..align.alignment import Alignment
+from ..align.whole import Whole
 from ..mobius import Mobius
+from ..surface.mesh import Booleans
+from ..surface.parts import Parts
 from ..surface.tidy import Cleaned
 from .correspond import Correspondence
 
@@ -17,10 +22,14 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
     `coverage` is the share of the target's area whose vertices are matched, `cut_to` the shares that were aligned of
     surfaces of which a piece was cut out. `value` to `rival` are about the whole discs, `overlap` about the parts that
     both surfaces show, where these are less; `rival_margin` is the latter's then.
+    `parts` has a row for each part of the meshes, if there are several: what it is on either side (null: no
+    counterpart), how certain the pair is, and how far apart they remain, in diagonals of the source.
     """
     found, parts = alignment.search, alignment.overlap
     tidy = alignment.target_cleaned
     areas = alignment.target.mesh.vertex_areas if tidy is None else tidy.area_at_vertices()
+    if alignment.whole is not None:
+        areas = alignment.whole.target.mesh.vertex_areas
     decisive = alignment if parts is None else parts.alignment
     return {
         "source": alignment.source.mesh.name,
@@ -53,8 +62,10 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
             "samples": len(decisive.source_samples),
             "matches": len(decisive.matches),
         },
+        "parts": _parts(alignment.whole, correspondence),
         "vertices_unfolded": None if decisive.bending is None else decisive.bending.repaired,
-        "coverage": float(areas[correspondence.matched].sum() / areas.sum()) * _share(tidy),
+        "coverage": float(areas[correspondence.matched].sum() / areas.sum())
+        * (1.0 if alignment.whole else _share(tidy)),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
         "flips_repaired": {"source": alignment.source.flips_repaired, "target": alignment.target.flips_repaired},
@@ -62,6 +73,39 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "settings": asdict(alignment.settings),
         "warnings": list(alignment.warnings),
         "causes": list(alignment.causes),
+    }
+
+
+def _parts(whole: Whole | None, correspondence: Correspondence) -> list[dict[str, Any]] | None:
+    if whole is None:
+        return None
+    return [
+        {
+            "source": _part(whole.source, pair.source),
+            "target": _part(whole.target, pair.target),
+            "certainty": pair.certainty,
+            "offset": pair.offset,
+            "matched": None if pair.target is None else _matched(correspondence, whole.target.of_vertex == pair.target),
+        }
+        for pair in whole.pairs
+    ]
+
+
+def _matched(correspondence: Correspondence, of_part: Booleans) -> float:
+    """Return which share of a part's vertices is matched; 0 where all of them count as another part's."""
+    return float(correspondence.matched[of_part].sum() / max(int(of_part.sum()), 1))
+
+
+def _part(parts: Parts, number: int | None) -> dict[str, Any] | None:
+    """Return which part it is, one of its vertices, how many it has, and its share of the area."""
+    if number is None:
+        return None
+    own = np.flatnonzero(parts.of_vertex == number)
+    return {
+        "part": number,
+        "vertex": int(own[0]) if len(own) else None,
+        "vertices": len(own),
+        "area": float(parts.area[number] / parts.area.sum()),
     }
 
 

@@ -74,6 +74,10 @@ def _cleaned(mesh: TriangleMesh, largest_part: bool, fill_holes: bool, keys: Flo
     return work.result()
 
 
+LEFT_OUT = ("smaller part left out", "smaller parts left out", "other part left out", "other parts left out")
+"""How what is said of other parts ends."""
+
+
 class _Work:
     """A mesh while it is put in order."""
 

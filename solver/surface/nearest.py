@@ -60,7 +60,8 @@ class SurfacePoints:
     @cached_property
     def _on_rim(self) -> Booleans:
         rim = np.zeros(len(self.mesh.vertices), bool)
-        rim[np.concatenate(self.loops)] = True
+        for loop in self.loops:
+            rim[loop] = True
         return rim
 
     @cached_property
@@ -116,7 +117,9 @@ class SurfacePoints:
         """Return the faces, (q, samples), of the samples that suit each query best; fewer if there are fewer."""
         tree, face_of_sample = self._tree
         count = min(samples, len(face_of_sample))
-        found = tree.query(np.hstack([points, self.normal_weight * normals]), k=count, workers=-1)[1]
+        found = tree.query(
+            np.hstack([points, self.normal_weight * normals]), k=count, workers=-1 if len(points) > 2000 else 1
+        )[1]
         return face_of_sample[np.asarray(found).reshape(len(points), count)]
 
     def _around(self, faces: Integers) -> Integers:

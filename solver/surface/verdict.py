@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cleaning import cleaned
+from .cleaning import LEFT_OUT, cleaned
 from .mesh import Floats, Integers, TriangleMesh, plural
 from .necks import necks
 from .tidy import Cleaned
@@ -40,7 +40,11 @@ class Verdict:
         loops = list(self.topology.boundary_loops)
         del loops[int(np.argmax(self.topology.loop_lengths))]
         closed = closing(loops)
-        return (*self.tidy.changes, closed) if closed else self.tidy.changes
+        changes = [
+            said.removesuffix("left out") + "aligned beside it" if said.endswith(LEFT_OUT) else said
+            for said in self.tidy.changes
+        ]
+        return (*changes, closed) if closed else tuple(changes)
 
     def describe(self) -> str:
         """Return one line that says what the mesh is and what will be done about it."""

@@ -165,16 +165,22 @@ def test_the_largest_part_is_kept_unless_that_is_switched_off() -> None:
     assert colors[0] == pytest.approx([0.05, 0.05, 0.05, 1])
 
 
-def test_transfer_leaves_other_parts_of_the_target_alone(pair: tuple[Any, Any]) -> None:
+def test_transfer_leaves_other_parts_of_the_target_alone_if_asked(pair: tuple[Any, Any]) -> None:
     target = make_sheet("Parts", 16, keep=lambda i, j: j != 2)
     bpy.context.scene.mobius.target = target
-    assert bpy.ops.mobius.align(**QUICK, largest_part=True) == {"FINISHED"}
+    assert bpy.ops.mobius.align(**QUICK, parts="main") == {"FINISHED"}
     assert bpy.ops.mobius.transfer() == {"FINISHED"}
     column = np.arange(256) % 16
     group = target.vertex_groups["Right"].index
     members = np.array([any(g.group == group for g in vertex.groups) for vertex in target.data.vertices])
     assert not members[column <= 2].any()
     assert members[column > 4].all()
+    # otherwise a part without a counterpart has what is beside it
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    assert bpy.ops.mobius.transfer() == {"FINISHED"}
+    group = target.vertex_groups["Right"].index
+    members = np.array([any(g.group == group for g in vertex.groups) for vertex in target.data.vertices])
+    assert members[column <= 2].any()
 
 
 # faces

@@ -23,7 +23,7 @@ def test_check_says_what_will_be_done_about_a_mesh(scans: Path, capsys: pytest.C
     status, out, err = run(capsys, "check", scans / "hole.obj", scans / "parts.obj")
     assert (status, err) == (0, "")
     assert "hole.obj: disc, 36 vertices, boundary of 20 edges; for the computation: 1 opening (4 edges) closed" in out
-    assert "; for the computation: 1 smaller part left out" in out.splitlines()[1]
+    assert "; for the computation: 1 smaller part aligned beside it" in out.splitlines()[1]
 
 
 def test_check_exits_1_for_what_can_be_no_disc_and_2_for_what_is_unreadable(

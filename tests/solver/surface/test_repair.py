@@ -122,7 +122,7 @@ def test_two_sides_of_cloth_are_not_sewn_together(sheet: TriangleMesh) -> None:
     n = len(sheet.vertices)
     both = np.concatenate([sheet.faces, sheet.faces[:, [0, 2, 1]] + n])
     cloth = TriangleMesh(np.concatenate([sheet.vertices] * 2), both, "Cloth")
-    assert verdict(cloth).repairs == ("1 smaller part left out",)
+    assert verdict(cloth).repairs == ("1 smaller part aligned beside it",)
     loose = TriangleMesh(cloth.vertices[both.ravel()], np.arange(both.size).reshape(-1, 3), "Cloth")
     assert topology(cleaned(loose).mesh).parts == 2
     with pytest.raises(MeshError, match="'Cloth' has 2 separate parts"):
@@ -136,7 +136,7 @@ def test_holes_in_both_sides_of_cloth_do_not_join_them(sheet: TriangleMesh) -> N
     back = np.delete(faces, beside, axis=0)[:, [0, 2, 1]] + n
     both = np.concatenate([np.delete(faces, inner, axis=0), back])
     cloth = TriangleMesh(np.concatenate([sheet.vertices] * 2), both, "Cloth")
-    assert verdict(cloth).repairs == ("1 smaller part left out", "1 missing triangle put in")
+    assert verdict(cloth).repairs == ("1 smaller part aligned beside it", "1 missing triangle put in")
 
 
 def test_a_surface_that_was_cut_open_on_purpose_stays_open() -> None:

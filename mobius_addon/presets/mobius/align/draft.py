@@ -6,6 +6,7 @@ settings = bpy.context.scene.mobius
 
 settings.reflect = "auto"
 settings.refine = "mobius"
+settings.parts = "all"
 settings.samples = 60
 settings.targets = 500
 settings.radius = 0.0

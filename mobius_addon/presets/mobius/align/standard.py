@@ -6,6 +6,7 @@ settings = bpy.context.scene.mobius
 
 settings.reflect = "auto"
 settings.refine = "dense"
+settings.parts = "all"
 settings.samples = 100
 settings.targets = 1000
 settings.radius = 0.0

@@ -6,6 +6,7 @@ settings = bpy.context.scene.mobius
 
 settings.reflect = "auto"
 settings.refine = "dense"
+settings.parts = "all"
 settings.samples = 200
 settings.targets = 2000
 settings.radius = 0.0
