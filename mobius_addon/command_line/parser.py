@@ -6,9 +6,9 @@ import argparse
 from typing import Any
 
 from ..streams import say_error
-from . import align, check, demo, flatten, transfer
+from . import align, check, demo, flatten, transfer, wrap
 
-_COMMANDS = {"demo": demo, "check": check, "flatten": flatten, "align": align, "transfer": transfer}
+_COMMANDS = {"demo": demo, "check": check, "flatten": flatten, "align": align, "transfer": transfer, "wrap": wrap}
 
 
 class Usage(Exception):  # noqa: N818  (carries argparse's own exit)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..streams import DONE, NOT_ALIGNED, say, say_error
 from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
-from .pair import align_pair, opened_pair, read_pair
+from .pair import align_pair, fitting_map, opened_pair, read_pair
 from .several_targets import one_by_one
 from .transfer_options import add_transfer_options, transfer_settings
 
 if TYPE_CHECKING:
-    from ...solver import Correspondence
     from ..attributes import Transfer
-    from ..mesh_data import Surface
 
 HELP = (
     "Carry what is on the source over to the target, or to each of several. With several, -o, --map and --report "
@@ -64,9 +61,10 @@ def _transfer_to(options: argparse.Namespace) -> None:
     """Carry what is on the source over to one target."""
     from dataclasses import asdict
 
-    from ...solver import load_map, report, save_map
+    from ...solver import report, save_map
     from ..files import Unreadable, outputs, write_mesh
-    from ..operators.transfer import describe_counts, read_through
+    from ..last_transfer import describe_counts
+    from ..operators.transfer import read_through
 
     choices = transfer_settings(options)
     settings = align_settings(options)
@@ -77,7 +75,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
         if options.use_map:
-            correspondence = _fitting_map(load_map, options, surfaces)
+            correspondence = fitting_map(options, surfaces)
         else:
             alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
         plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
@@ -102,23 +100,6 @@ def _require_writable(options: argparse.Namespace) -> None:
     inputs = [options.source, options.target, options.use_map, options.landmarks]
     others = [options.map, options.report]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
-
-
-def _fitting_map(
-    load_map: Callable[..., Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
-) -> Correspondence:
-    """Load a map and make sure that it is one between these two meshes."""
-    from ..files import Unreadable
-
-    path = options.use_map
-    if not path.is_file():
-        raise Unreadable(f"there is no file '{path}'")
-    try:
-        return load_map(path, *(surface.rest for surface in surfaces))
-    except OSError as error:
-        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
-        raise Unreadable(str(error)) from error
 
 
 def _listed(plan: Transfer) -> list[dict[str, str]]:

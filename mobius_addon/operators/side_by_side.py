@@ -8,6 +8,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ...solver import MeshError
+from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
@@ -127,22 +128,6 @@ def _remove(collection: bpy.types.Collection) -> None:
     for obj in list(collection.objects):
         bpy.data.objects.remove(obj)
     bpy.data.collections.remove(collection)
-
-
-def similarity(moving: Floats, fixed: Floats) -> Floats:
-    """Return the matrix, (4, 4), of rotation, uniform scale and shift that best carries points, (k, 3), onto others.
-
-    Least squares without a reflection: Umeyama, "Least-squares estimation of transformation parameters" (1991).
-    """
-    middle, aim = moving.mean(axis=0), fixed.mean(axis=0)
-    u, stretch, v = np.linalg.svd((fixed - aim).T @ (moving - middle))
-    sign = np.array([1, 1, np.sign(np.linalg.det(u @ v))])
-    turn = (u * sign) @ v
-    size = (stretch @ sign) / max(((moving - middle) ** 2).sum(), 1e-300)
-    matrix = np.eye(4)
-    matrix[:3, :3] = size * turn
-    matrix[:3, 3] = aim - size * turn @ middle
-    return matrix
 
 
 def _beside(first: Floats, second: Floats) -> float:

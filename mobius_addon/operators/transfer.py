@@ -1,7 +1,6 @@
 """Carry data from the source to the target, or to many targets, through their last alignments."""
 
 # no postponed annotations here: Blender reads the properties from them
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -9,9 +8,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import Correspondence
-from .. import stored_alignment
+from .. import last_transfer, stored_alignment
 from ..attributes import (
-    KINDS,
     Carrier,
     Reading,
     Transfer,
@@ -92,15 +90,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
         pairs = list(zip(objects, result, strict=True))
         write_transfers(pairs)
         for obj, plan in pairs:
-            tell(self.report, obj.name, self._source, plan)
-
-
-def tell(report: Callable[[set[str], str], None], target: str, source: str, plan: Transfer) -> None:
-    """Report what a transfer has written."""
-    for warning in plan.warnings:
-        report({"WARNING"}, warning)
-    carried = describe_counts(plan.counts())
-    report({"INFO"}, rpt_("'{}' has {} from '{}'{}").format(target, carried, source, plan.unmatched.remark()))
+            last_transfer.announce(self.report, obj, self._source, plan)
 
 
 def read_through(
@@ -182,9 +172,3 @@ def selected_targets(context: bpy.types.Context, source: bpy.types.Object) -> li
         if twin := next((x for x in (source, *targets) if x != obj and x.data == obj.data), None):
             raise Refusal(f"'{obj.name}' and '{twin.name}' share one mesh: deselect one or make it single-user")
     return targets
-
-
-def describe_counts(counts: dict[str, int]) -> str:
-    """Return what a transfer carried, as in '3 vertex groups, 1 UV map'."""
-    nouns = {kind.identifier: kind.noun for kind in KINDS}
-    return ", ".join(f"{n} {nouns[kind] if n > 1 else nouns[kind].removesuffix('s')}" for kind, n in counts.items())

@@ -40,6 +40,8 @@ class AlignSettings:
     fill_holes : bool
         Allow meshes with openings and handles: all boundary loops but the outer one are closed for the computation, and
         small handles cut and closed. Without it such a mesh is refused.
+    cut : bool
+        Of a surface that no disc carries as a whole, as of a body, take the piece that fits the other one.
     source_outer, target_outer : int, optional
         A vertex on the loop that is to be the outer one; by default the longest loop is.
     """
@@ -55,6 +57,7 @@ class AlignSettings:
     time_limit: float | None = 60.0
     refine: str = "dense"
     fill_holes: bool = True
+    cut: bool = True
     source_outer: int | None = None
     target_outer: int | None = None
 
