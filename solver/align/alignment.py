@@ -155,7 +155,7 @@ class Alignment:
 
     @cached_property
     def evidence(self) -> Floats:
-        """What speaks against the map at each target vertex in use, (q, 7): see `confidence.evidence`."""
+        """What speaks against the map at each target vertex in use, (q, 8): see `confidence.evidence`."""
         return evidence(
             self.source,
             self.target,
@@ -164,7 +164,7 @@ class Alignment:
             self.located,
             self.carried,
             unmatched_share(self.value, len(self.source_samples)),
-            None if self.bending is None else (self.mobius, self.bending.offset),
+            None if self.bending is None else (self.mobius, self.bending.offset, self.unfolded),
         )
 
     @cached_property
@@ -182,6 +182,12 @@ class Alignment:
         if self.counterpart is not None:
             result[~self.counterpart] = 0
         return result
+
+    @property
+    def unfolded(self) -> float:
+        """Share of the vertices that were moved so that no triangle is folded; 0 if nothing was bent."""
+        bent = self if self.overlap is None else self.overlap.alignment
+        return 0.0 if bent.bending is None else bent.bending.repaired / len(bent.target.disc)
 
     @property
     def mean_confidence(self) -> float:

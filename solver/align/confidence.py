@@ -23,14 +23,14 @@ BOUND = 0.02
 NEAR_RIM = 0.05
 """Length over which the influence of the source's boundaries fades, in roots of the source's area."""
 
-COLUMNS = ("constant", "descriptors", "stretch", "near rim", "unmatched samples", "moved", "offset")
+COLUMNS = ("constant", "descriptors", "stretch", "near rim", "unmatched samples", "moved", "offset", "unfolded")
 
-DENSE = np.array([4.586, -1.22, -4.349, 0.0, -7.783, 0.0, 0.0])
+DENSE = np.array([4.586, -1.22, -4.349, 0.0, -7.783, 0.0, 0.0, 0.0])
 """Coefficients of the columns for maps that were bent: of 80 best maps and 18 rivals on 9 kinds of surface. On a kind
 left out the mean confidence is 0.002 to 0.24 away from the share of points below `BOUND`, in bins of confidence 0.02 to
 0.25: too low where one side alone has openings, too high on teeth. Columns with 0 say nothing beyond the others."""
 
-MOBIUS = np.array([2.891, -1.415, -4.458, 0.0, -4.952, 0.0, 0.0])
+MOBIUS = np.array([2.891, -1.415, -4.458, 0.0, -4.952, 0.0, 0.0, 0.0])
 """The same for Möbius maps: 0.01 to 0.24 away, in bins 0.02 to 0.24."""
 
 
@@ -53,7 +53,7 @@ def unmatched_share(matched: float, count: int) -> float:
 
 
 def probability(seen: Floats, *, bent: bool) -> Floats:
-    """Return the probability, (q,), of an error below `BOUND` from evidence, (q, 7), for maps that were bent or not."""
+    """Return the probability, (q,), of an error below `BOUND` from evidence, (q, 8), for maps that were bent or not."""
     return expit(seen @ (DENSE if bent else MOBIUS))
 
 
@@ -65,14 +65,15 @@ def evidence(
     located: tuple[Integers, Floats],
     carried: Complexes,
     unmatched: float,
-    bending: tuple[Mobius, Floats] | None,
+    bending: tuple[Mobius, Floats, float] | None,
 ) -> Floats:
-    """Return what speaks against a map at each target vertex in use, (q, 7), columns as in `COLUMNS`.
+    """Return what speaks against a map at each target vertex in use, (q, 8), columns as in `COLUMNS`.
 
     The constant 1; the root mean square difference of the descriptors; the modulus of the log of the stretch, relative
     to its median; exp(-distance from the source's boundaries / `NEAR_RIM`); the share of the samples that the search
     did not match; how far from its Möbius image the vertex was bent, and how far above the source it stayed, in roots
-    of the source's area (both 0 where nothing was bent). All but the last two are cut off where they say no more.
+    of the source's area; the share of all vertices that the unfolding moved (the last three are 0 where nothing was
+    bent). Descriptors and stretch are cut off where they say no more.
 
     Parameters
     ----------
@@ -84,8 +85,8 @@ def evidence(
         Where each goes in the source's disc.
     unmatched : float
         Share of the samples that the search did not match.
-    bending : Mobius and (n_target,) float64, or None
-        What was bent, and how far above the source each vertex stayed.
+    bending : Mobius, (n_target,) float64 and float, or None
+        What was bent, how far above the source each vertex stayed, and the share of them that the unfolding moved.
     """
     used = np.flatnonzero(np.isfinite(target.disc.real))
     face, barycentric = located[0][used], located[1][used]
@@ -99,9 +100,9 @@ def evidence(
     places = np.einsum("qk,qkd->qd", barycentric, vertices[faces[face]])
     rim = vertices[np.concatenate([source.boundary, *source.holes])]
     near = np.exp(-KDTree(rim).query(places)[0] / root / NEAR_RIM)
-    moved, offset = np.zeros(len(used)), np.zeros(len(used))
+    moved, offset, unfolded = np.zeros(len(used)), np.zeros(len(used)), 0.0
     if bending is not None:
-        mobius, above = bending
+        mobius, above, unfolded = bending
         start = mobius.inverse()(target.disc[used])
         there, weights = TriangulatedDisc.of(source.disc, faces).locate(start)
         moved = np.linalg.norm(np.einsum("qk,qkd->qd", weights, vertices[faces[there]]) - places, axis=1) / root
@@ -115,6 +116,7 @@ def evidence(
             np.full(len(used), unmatched),
             moved,
             offset,
+            np.full(len(used), unfolded),
         ],
         axis=1,
     )

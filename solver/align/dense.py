@@ -10,7 +10,7 @@ from ..bend.bend import ROUNDS, Draft, drafted, finished
 from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
 from ..stages import Part
-from ..surface.mesh import Booleans, Integers
+from ..surface.mesh import Booleans, Floats, Integers
 from .agreement import trust
 from .alignment import Alignment
 from .overlap import piece, shared
@@ -26,8 +26,11 @@ DRAFTS = 4
 """Drafts at most until the overlap is settled."""
 
 
-def drafted_from(found: Alignment, clock: Part) -> tuple[Draft, Booleans, Booleans]:
-    """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it."""
+def drafted_from(found: Alignment, clock: Part, start: Floats | None = None) -> tuple[Draft, Booleans, Booleans]:
+    """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
+
+    It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
+    """
     clock.begin("bend", "Bending", 0.0)
     source, target = found.source, found.target
     believed = trust(
@@ -38,7 +41,7 @@ def drafted_from(found: Alignment, clock: Part) -> tuple[Draft, Booleans, Boolea
         found.target_descriptors,
         found.difference,
     )
-    draft = drafted(found.mobius, source, target, believed, progress=clock.within(0.0, 0.15))
+    draft = drafted(found.mobius, source, target, believed, start, progress=clock.within(0.0, 0.15))
     return draft, *shared(draft, source, target, clock.within(0.15, 0.2))
 
 

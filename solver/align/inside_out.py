@@ -15,7 +15,7 @@ from ..stages import Part
 from ..surface.mesh import Integers, MeshError
 from .alignment import Alignment
 from .dense import bent_densely, drafted_from
-from .mobius_map import roughly_aligned
+from .mobius_map import challenged, searched
 from .prepared import Surface
 from .reconsider import DOUBTFUL
 
@@ -39,11 +39,12 @@ def turned_round(
         target.original, fill_holes=target.fill_holes, outer_vertex=target.outer_vertex, tidy=target.cleaned.turned()
     )
     try:
-        matched = roughly_aligned(source, turned, found.settings, part, landmarks)
+        matched = searched(source, turned, found.settings, part, landmarks)
     except MeshError:
         return None
-    if matched.value - found.value <= found.settings.reflect_margin * len(found.source_samples):
+    if matched.search.value - found.search.value <= found.settings.reflect_margin * len(found.source_samples):
         return None
+    matched = challenged(matched, part)
     part = clock.part(0.5, 1.0, "inside out")
     other = bent_densely(matched, drafted_from(matched, part), part, landmarks)
     if _sure(other) <= max(DOUBTFUL, _sure(found)):

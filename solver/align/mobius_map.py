@@ -9,10 +9,11 @@ import numpy as np
 
 from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult, search
+from ..search.fit import algebraic_fit
 from ..search.matching import Objective
 from ..search.rival import Rival, best_rival
 from ..stages import Cancelled, Part
-from ..surface.mesh import Integers
+from ..surface.mesh import Complexes, Floats, Integers
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility, covering_radius
@@ -28,7 +29,18 @@ def roughly_aligned(
     clock: Part,
     landmarks: Integers | None,
 ) -> Alignment:
-    """Flatten, search, and refine the transformation; of prepared surfaces the rest is there already."""
+    """Flatten, search, look for a rival, and refine the transformation."""
+    return challenged(searched(source_surface, target_surface, settings, clock, landmarks), clock)
+
+
+def searched(
+    source_surface: Surface,
+    target_surface: Surface,
+    settings: AlignSettings,
+    clock: Part,
+    landmarks: Integers | None,
+) -> Alignment:
+    """Flatten and search; of prepared surfaces the rest is there already."""
     clock.begin("flatten source", "Flattening the source", 0.0)
     source = source_surface.flattening
     clock.begin("flatten target", "Flattening the target", 0.1)
@@ -53,10 +65,8 @@ def roughly_aligned(
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
         target_samples = np.concatenate([target_samples, pairs[:, 1]])
         problem = Objective(source.disc[source_samples], target.disc[target_samples], radius, weights)
-    found, other, said = _searched(problem, settings, clock)
-    warnings += said
-    warnings += unproved(found)
-    alignment = Alignment(
+    found, other, said = _both_sides(problem, settings, clock)
+    return Alignment(
         mobius=found.mobius,
         search=found,
         source=source,
@@ -70,7 +80,14 @@ def roughly_aligned(
         other=other,
         source_cleaned=source_surface.cleaned,
         target_cleaned=target_surface.cleaned,
+        warnings=(*warnings, *said, *unproved(found)),
     )
+
+
+def challenged(alignment: Alignment, clock: Part) -> Alignment:
+    """Look for a rival of what the search found, and refine what is gone on with on all vertices."""
+    found, settings, warnings = alignment.search, alignment.settings, list(alignment.warnings)
+    source_samples = alignment.source_samples
     clock.begin("rival", "Looking for a rival", 0.75)
     near = settings.reflect_margin * len(source_samples)
     rival = rival_of(alignment, [found.mobius], found.value - near, clock)
@@ -112,14 +129,21 @@ def rival_of(found: Alignment, known: list[Mobius], enough: float | None, clock:
 def taking(found: Alignment, rival: Rival | None, tell: Callable[[float], None]) -> Alignment:
     """Go on with a rival, or with the best if that is None: refine it on all vertices."""
     found = replace(found, taken=rival, mobius=(rival or found.search).mobius)
-    if found.settings.refine == "none":
-        return found
+    return found if found.settings.refine == "none" else improved(found, found.difference, tell)
+
+
+def improved(found: Alignment, difference: float, tell: Callable[[float], None] | None = None) -> Alignment:
+    """Refine the transformation on all vertices; `difference`: of descriptors of points that belong together."""
     descriptors = found.source_descriptors, found.target_descriptors
-    mobius = refined(found.mobius, found.source, found.target, *descriptors, found.difference, tell)
-    return replace(found, mobius=mobius)
+    return replace(found, mobius=refined(found.mobius, found.source, found.target, *descriptors, difference, tell))
 
 
-def _searched(
+def implied(source: Complexes, target: Complexes, weights: Floats, reflected: bool) -> Mobius:
+    """Return the transformation nearest to bringing points of the source's disc to the target's, (k,) each."""
+    return replace(algebraic_fit(np.conj(source) if reflected else source, target, weights), reflected=reflected)
+
+
+def _both_sides(
     problem: Objective, settings: AlignSettings, clock: Part
 ) -> tuple[SearchResult, SearchResult | None, list[str]]:
     """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""

@@ -9,17 +9,15 @@ from scipy.spatial import KDTree
 
 from ..bend.bend import Draft, drafted, finished
 from ..mobius import hyperbolic_distance
-from ..search.fit import algebraic_fit
 from ..search.rival import ELSEWHERE
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, Integers, MeshError
 from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
 from .confidence import SURE
-from .mobius_map import roughly_aligned
+from .mobius_map import implied, improved, roughly_aligned
 from .overlap import Piece, shared
 from .prepared import Surface
-from .refine import refined
 
 SMALLEST_OVERLAP = 0.1
 """Share of either surface's area below which an overlap is no ground to go on from."""
@@ -120,18 +118,10 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
     apart = hyperbolic_distance(inner.mobius.inverse()(disc), expected)
     if len(apart) < 3 or np.median(apart) < ELSEWHERE:
         return inner
-    reflected = inner.mobius.reflected
-    fit = algebraic_fit(np.conj(expected) if reflected else expected, disc, np.ones(len(disc)))
-    mobius = refined(
-        replace(fit, reflected=reflected),
-        inner.source,
-        inner.target,
-        inner.source_descriptors,
-        inner.target_descriptors,
-        inner.difference,
-    )
+    mobius = implied(expected, disc, np.ones(len(disc)), inner.mobius.reflected)
     said = "ambiguous: the best map of the pieces by themselves sends everything elsewhere"
-    return replace(inner, mobius=mobius, warnings=(*inner.warnings, said))
+    inner = replace(inner, mobius=mobius, warnings=(*inner.warnings, said))
+    return improved(inner, inner.difference)
 
 
 def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Booleans) -> Booleans:

@@ -35,8 +35,8 @@ def align(
     """Find where every point of the target belongs on the source; landmarks are not needed.
 
     With dense refinement the surfaces may show different pieces of the same thing. The overlap is found from a stiff
-    draft of the bending, cut out of both, and aligned by itself: `Alignment.overlap`. And a map that is doubtful, or
-    mirrored, is compared with other maxima of the search, of which one that fits is taken, unless landmarks decide.
+    draft of the bending, cut out of both, and aligned by itself: `Alignment.overlap`. And a map that is in doubt is
+    compared with others, of which the best is taken (`reconsidered`), unless landmarks decide.
 
     Parameters
     ----------
@@ -122,12 +122,13 @@ def _of_main_parts(
     found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
     if settings.refine == "dense":
         part = clock.part(0.7, 0.95)
-        found = bent_densely(matched, drafted_from(matched, part), part, pairs)
+        first = drafted_from(matched, part)
+        found = bent_densely(matched, first, part, pairs)
         other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
         if other is not None:
             found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
-            found = reconsidered(found, matched, clock.part(0.97, 1))
+            found = reconsidered(found, matched, first, clock.part(0.97, 1))
     return replace(found, warnings=(*said, *found.warnings)), (source, target)
 
 

@@ -155,9 +155,7 @@ def drafted(
     used = np.flatnonzero(np.isfinite(target.disc.real))
     conformal = np.full(len(target.disc), complex(np.nan, np.nan))
     conformal[used] = mobius.inverse()(target.disc[used])
-    # a mirrored target is mirrored back, and its faces turned, so that normals agree
-    mirror, order = ([-1, 1, 1], [0, 2, 1]) if mobius.reflected else ([1, 1, 1], [0, 1, 2])
-    whole = TriangleMesh(target.mesh.vertices * mirror, target.mesh.faces[:, order])
+    whole, order = facing(target.mesh, mobius.reflected)
 
     tell(0.0)
     few = coarse(target, NODES, order)
@@ -176,6 +174,12 @@ def drafted(
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
     return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now)
+
+
+def facing(mesh: TriangleMesh, reflected: bool) -> tuple[TriangleMesh, list[int]]:
+    """Return the mesh, mirrored back with its faces turned if it is reflected, so that normals agree; their order."""
+    mirror, order = ([-1, 1, 1], [0, 2, 1]) if reflected else ([1, 1, 1], [0, 1, 2])
+    return TriangleMesh(mesh.vertices * mirror, mesh.faces[:, order]), order
 
 
 def _best_start(

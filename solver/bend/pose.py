@@ -29,13 +29,13 @@ FAR = 0.1
 """Distance, in roots of the source's area, from which on a point counts as not lying on the other surface at all."""
 
 
-def in_pose(rest: TriangleMesh, onto: SurfacePoints) -> Floats:
-    """Return the vertices of `rest` in the rigid pose nearest to the source's tangent planes.
+def in_pose(rest: TriangleMesh, onto: SurfacePoints, rounds: int = POSE_ROUNDS) -> Floats:
+    """Return the vertices of `rest` in the rigid pose nearest to the source's tangent planes, after so many rounds.
 
     The scale stays: distances to planes fall when a surface merely shrinks.
     """
     areas, x = rest.vertex_areas / rest.area, rest.vertices
-    for _ in range(POSE_ROUNDS):
+    for _ in range(rounds):
         stiffness, force = pulls(x, rest.faces, areas, onto, np.zeros(len(x), bool))
         middle = areas @ x
         arm = x - middle

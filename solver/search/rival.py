@@ -89,7 +89,13 @@ def best_rival(
     )
     if found.cancelled:
         return None
+    rival = scored(objective, replace(found.mobius, reflected=reflected))
+    return replace(rival, upper_bound=max(found.upper_bound, rival.value), out_of_time=found.out_of_time)
+
+
+def scored(objective: Objective, mobius: Mobius) -> Rival:
+    """Return a transformation that comes from elsewhere, with its Q; nothing is claimed of any other."""
+    seen = np.conj(objective.source) if mobius.reflected else objective.source
     whole = matching(seen, objective.target, objective.radius, weights=objective.weights)
-    value = whole.value(found.mobius)
-    mobius = replace(found.mobius, reflected=reflected)
-    return Rival(mobius, value, max(found.upper_bound, value), whole.matches(found.mobius), found.out_of_time)
+    plain = replace(mobius, reflected=False)
+    return Rival(mobius, whole.value(plain), np.inf, whole.matches(plain))

@@ -22,21 +22,29 @@ from .correspondence.pairs import Pair
 from .correspondence.sets import SETS
 from .correspondence.store import Store, code
 
+FITTED = ["simpop", "ict", "ict-open", "one-open", "teeth", "hard-teeth", "brain", "bent", "partial", "cropped"]
+FITTED += ["bodyparts", "noise", "depth", "coarse"]
+"""Kinds of surface that the confidence is fitted to."""
+
 BINS = 10
 
 MAPS = ("dense", "mobius")
 
 
-def observed(pair: Pair, store: Store, wrong: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+WRONG = ("rival", "turned")
+"""Maps that are as a rule wrong: the best that sends everything elsewhere, and the best of the other orientation."""
+
+
+def observed(pair: Pair, store: Store, wrong: str = "") -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return evidence at points of a pair, (q, d), and their errors as shares of the source's diagonal, (q,).
 
-    For the "dense" map and the "mobius" one before it; of the best rival in place of the best map, if `wrong`. Points
+    For the "dense" map and the "mobius" one before it; of one of `WRONG` in place of the best map, if wanted. Points
     found to lie beyond the source are left out: these are not matched, whatever the evidence.
     """
 
     def made() -> dict[str, np.ndarray]:
-        reflect = "always" if pair.reflected else "never"
-        settings = AlignSettings(fill_holes=pair.openings, reflect=reflect, take_rival=wrong)
+        reflect = "always" if pair.reflected != (wrong == "turned") else "never"
+        settings = AlignSettings(fill_holes=pair.openings, reflect=reflect, take_rival=wrong == "rival")
         found = align(pair.source, pair.target, settings)
         before = replace(found, bending=None, overlap=None, counterpart=None)
         result = {}
@@ -162,19 +170,19 @@ def main() -> None:
     """Fit, check and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--sets", default="simpop,ict,ict-open,one-open,teeth,hard-teeth,brain,bent,partial")
+    parser.add_argument("--sets", default=",".join(FITTED))
     parser.add_argument("--pairs", type=int)
     parser.add_argument("--plot", type=Path)
     options = parser.parse_args()
     store, kinds = Store(options.output), {}
     for kind in options.sets.split(","):
         for pair in SETS[kind](store, options.pairs):
-            kinds.setdefault(kind, []).append(observed(pair, store, wrong=False))
+            kinds.setdefault(kind, []).append(observed(pair, store))
             good = [f"{100 * (kinds[kind][-1][name][1] < BOUND).mean():.1f} % {name}" for name in MAPS]
             print(f"{kind} {pair.name}: below {100 * BOUND:g} %: {', '.join(good)}", flush=True)
-        # what is wrong must be seen too: one map in a handful
-        for pair in SETS[kind](store, 1):
-            kinds[kind].append(observed(pair, store, wrong=True))
+        # what is wrong must be seen too: a few of each kind
+        for number, pair in enumerate(SETS[kind](store, 2)):
+            kinds[kind].append(observed(pair, store, WRONG[number % len(WRONG)]))
     for name in MAPS:
         seen = {kind: [found[name] for found in pairs] for kind, pairs in kinds.items()}
         coefficients = fitted([found for pairs in seen.values() for found in pairs])

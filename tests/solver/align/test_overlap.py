@@ -181,7 +181,7 @@ def test_opposite_sides_of_something_symmetric_are_not_taken_for_mirror_images(c
     assert alignment.other.mobius.reflected
     assert alignment.margin < -alignment.settings.reflect_margin
     assert not alignment.mobius.reflected
-    assert alignment.warnings[0].startswith("ambiguous orientation: mirrored scores")
+    assert alignment.warnings[0].startswith("ambiguous orientation: mirrored, ")
     # nothing is said of the mirrored search and its rival
     assert not any(said.startswith(("ambiguous: ", "not proved")) for said in alignment.warnings)
     error = percent(places(correspond(alignment), source), sheet.vertices[there[kept]], sheet)
