@@ -59,7 +59,7 @@ class Carrier:
         (n_target,) bool
             Where there is a value: the other vertices have no counterpart.
         """
-        return self._filled(self._matrix @ values.astype(np.float64))
+        return self.filled(self._matrix @ values.astype(np.float64))
 
     def corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
@@ -81,7 +81,7 @@ class Carrier:
         at_vertex[vertex[known]] = result[known]
         beside = known & ~whole
         at_vertex[vertex[beside]] = result[beside]
-        at_vertex, reached = self._filled(at_vertex)
+        at_vertex, reached = self.filled(at_vertex)
         result[~known] = at_vertex[vertex[~known]]
         return result, np.bincount(self.target.corner_polygon, ~reached[vertex])[self.target.corner_polygon] == 0
 
@@ -145,10 +145,10 @@ class Carrier:
             carried = self._gradients(values)
             if self.contacts:
                 carried = brought_together(self._gradients, carried, self._gradients.moved_places(values))
-            return self._filled(carried)
+            return self.filled(carried)
         rotation, scale = self._similarities
         carried = self._matrix @ values
-        return self._filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
+        return self.filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
 
     def normals(self, values: Values) -> tuple[Values, Booleans]:
         """Carry unit vectors per face corner, (c_source, 3), turned with the surface; returns as `points`.
@@ -174,7 +174,7 @@ class Carrier:
             return sums / np.bincount(surface.corner_polygon)
         return weights
 
-    def _filled(self, values: Values) -> tuple[Values, Booleans]:
+    def filled(self, values: Values) -> tuple[Values, Booleans]:
         """Return values per vertex with the gap filled if it is to be, and where there is a value."""
         if self.gap == "leave" or (self.correspondence.face >= 0).all():
             return values, self.reached

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Literal
 
+from ..textures.settings import TextureSettings
 from .expression_names import Spelling
 from .table import KINDS
 
@@ -74,6 +75,8 @@ class TransferSettings:
         Whether a layer whose name is taken by another of the person's own will "replace" that one or get Blender's
         "number"; what an earlier transfer wrote and nobody has edited is always replaced. Where `mix` or `target_mask`
         say how values join those that are there, they join them.
+    textures : TextureSettings
+        Choices about pictures.
 
     Raises
     ------
@@ -81,7 +84,7 @@ class TransferSettings:
         A number or word is outside its range.
     """
 
-    kinds: tuple[str, ...] = tuple(kind.identifier for kind in KINDS)
+    kinds: tuple[str, ...] = tuple(kind.identifier for kind in KINDS if kind.standard)
     layers: Literal["all", "active", "named"] = "all"
     names: tuple[str, ...] = ()
     deform_only: bool = False
@@ -98,6 +101,7 @@ class TransferSettings:
     spelling: Spelling = "keep"
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"
+    textures: TextureSettings = field(default_factory=TextureSettings)
 
     def __post_init__(self) -> None:
         if not 0 <= self.mix_factor <= 1:

@@ -6,16 +6,20 @@ from .. import viewport
 from ..registration import register_factory
 from . import (
     align,
+    align_selected,
     check,
     clear,
     conformal_transfer,
     discs,
     flatten,
     heat_map,
+    live,
     select_unmatched,
     side_by_side,
     swap,
     transfer,
+    use_selected,
+    wrap,
 )
 
 _register, _unregister = register_factory(
@@ -23,8 +27,12 @@ _register, _unregister = register_factory(
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
+        use_selected.MOBIUS_OT_use_selected,
         align.MOBIUS_OT_align,
+        align_selected.MOBIUS_OT_align_selected,
         transfer.MOBIUS_OT_transfer,
+        wrap.MOBIUS_OT_wrap,
+        live.MOBIUS_OT_live,
         select_unmatched.MOBIUS_OT_select_unmatched,
         conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ... import solver
 from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
-from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
+from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
@@ -63,7 +63,10 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         pairs = landmarks.from_scene(source, target, meshes, self.landmarks)
         keys = surfaces[0].keys, surfaces[1].keys
         moved = tuple(None if own is None else own.tobytes() for own in keys)
-        self._asked = meshes[0].fingerprint, meshes[1].fingerprint, moved, options, largest_part, pairs.tobytes()
+        within = piece_of(source, self.source_cut), piece_of(target, self.target_cut)
+        pieces = tuple(None if piece is None else piece.tobytes() for piece in within)
+        prints = meshes[0].fingerprint, meshes[1].fingerprint
+        self._asked = *prints, moved, pieces, options, largest_part, pairs.tobytes()
         found, repeated = _last.get(self._asked), self.options.is_repeat
 
         def work(report: Report) -> Aligned:
@@ -72,7 +75,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
             if repeated:  # the window would be frozen
                 text = rpt_("The result of '{}' is not known any more: call it again")
                 raise Refusal(text.format(rpt_(self.job_title)))
-            asked_for = {"largest_part": largest_part, "keys": keys, "landmarks": pairs}
+            asked_for = {"largest_part": largest_part, "keys": keys, "landmarks": pairs, "within": within}
             return Aligned(*aligned(*meshes, options, **asked_for, progress=report))
 
         return work
@@ -92,13 +95,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         """
         found = []
         for uid, name, surface in zip(self.objects_read, self._names, self.surfaces, strict=True):
-            obj = by_uid(bpy.data.objects, uid)
-            if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
-                raise Refusal(
-                    rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name)
-                )
-            if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
-                raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
+            obj = as_read(uid, name, surface)
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
             found.append(obj)
         return found[0], found[1]
@@ -159,15 +156,36 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
         self.announce(*pair, result)
 
 
+def as_read(uid: int, name: str, surface: Surface) -> bpy.types.Object:
+    """Return an object, if it is still what was read.
+
+    Raises
+    ------
+    Refusal
+        It is not.
+    """
+    obj = by_uid(bpy.data.objects, uid)
+    if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
+        raise Refusal(rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name))
+    if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
+        raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))
+    return obj
+
+
 def write_alignment(
     source: bpy.types.Object,
     target: bpy.types.Object,
     alignment: solver.Alignment,
     correspondence: solver.Correspondence,
     surfaces: Any,
+    frame: solver.Mobius | None = None,
 ) -> None:
-    """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
-    carried, still = alignment.mobius(alignment.source.disc), alignment.mobius(alignment.carried)
+    """Write the shared UV layout, the colors and the groups of matched points on both meshes.
+
+    `frame` carries the source's disc to where the layout shows it; by default to the target's.
+    """
+    frame = frame or alignment.mobius
+    carried, still = frame(alignment.source.disc), frame(alignment.carried)
     here, there = (
         tidy or solver.Cleaned.unchanged(surface.mesh)
         for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)

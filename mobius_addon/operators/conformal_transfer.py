@@ -7,27 +7,35 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import Correspondence
-from .. import results, stored_alignment
+from .. import last_transfer, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..jobs import Report, Work, why_busy
 from ..mesh_data import Refusal, read_surface
-from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, TransferOptions, draw_transfer, transfer_settings
+from ..options import (
+    ALIGN_OPTIONS,
+    SCAN_OPTIONS,
+    TRANSFER_OPTIONS,
+    TransferOptions,
+    draw_kinds,
+    draw_transfer,
+    transfer_settings,
+)
 from ..usable import by_uid, why_not, why_not_mode, why_not_two
 from .align import Aligned, AlignOperator
-from .transfer import read_through, tell
+from .transfer import read_through
 
 
 class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Operator):
-    """Find which point of the active mesh corresponds to which of the other selected mesh, and carry its data over."""
+    """Carry what is on the active mesh to the other selected one, of another shape, pose or triangulation."""
 
     bl_idname = "mobius.conformal_transfer"
-    bl_label = "Transfer by Conformal Map"
+    bl_label = "Transfer by Conformal Map (Mobius)"
     bl_options = {"REGISTER", "UNDO"}
     job_title = "Transfer by Conformal Map"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Allow for two selected meshes, of which the active one is the target."""
+        """Allow for two selected meshes, of which the active one is the source."""
         reason = _why_not(context) or why_busy()
         if reason:
             cls.poll_message_set(reason)
@@ -40,10 +48,10 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
                 setattr(self, name, getattr(context.scene.mobius, name))
         return self.execute(context)
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """Draw what can be changed without a new search."""
         self.layout.use_property_split = True
-        self.layout.column().prop(self, "kinds")
+        draw_kinds(self.layout, self, context.scene.mobius.source)
         draw_transfer(self.layout, self)
 
     def prepare(self, context: bpy.types.Context) -> Work:
@@ -80,22 +88,22 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
             plan.write(target)
         if isinstance(result, Aligned):
             self.announce(source, target, result)
-        tell(self.report, target.name, source.name, plan)
+        last_transfer.announce(self.report, target, source.name, plan)
         if (scene := by_uid(bpy.data.scenes, self._scene)) is not None:
             scene.mobius.source, scene.mobius.target = source, target
 
 
 def _pair(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Return the other selected object and the active one."""
-    target = context.object
-    return next(obj for obj in context.selected_objects if obj != target), target
+    """Return the active object and the other selected one: from active to selected, as Blender's own transfers go."""
+    source = context.object
+    return source, next(obj for obj in context.selected_objects if obj != source)
 
 
 def _why_not(context: bpy.types.Context) -> str | None:
     """Return why the selection cannot be used, or None if it can."""
-    chosen, target = context.selected_objects, context.object
-    if target is None or target not in chosen or len(chosen) != 2:
-        return rpt_("Select two meshes, the target last: it is the active one")
+    chosen, source = context.selected_objects, context.object
+    if source is None or source not in chosen or len(chosen) != 2:
+        return rpt_("Select two meshes, the source last: it is the active one")
     source, target = _pair(context)
     scene = context.scene
     reason = why_not(source, "source mesh", scene) or why_not(target, "target mesh", scene)

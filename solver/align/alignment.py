@@ -16,7 +16,7 @@ from ..search.matching import Objective
 from ..search.rival import Rival
 from ..surface.mesh import Booleans, Complexes, Floats, Integers
 from ..surface.tidy import Cleaned
-from .confidence import evidence, probability
+from .confidence import evidence, probability, unmatched_share
 from .objective import usual_difference
 from .overlap import Piece
 from .settings import AlignSettings
@@ -60,6 +60,8 @@ class Alignment:
         Wall-clock time per stage.
     warnings : tuple of str
         What the user should know, each a sentence.
+    causes : tuple of str
+        Why the map is doubtful, if it is and that is known: kinds of `diagnosis.Cause`.
     """
 
     mobius: Mobius
@@ -80,6 +82,7 @@ class Alignment:
     taken: Rival | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    causes: tuple[str, ...] = ()
     source_cleaned: Cleaned | None = None
     target_cleaned: Cleaned | None = None
 
@@ -155,7 +158,7 @@ class Alignment:
             self.target_descriptors,
             self.located,
             self.carried,
-            1 - self.value / len(self.source_samples),
+            unmatched_share(self.value, len(self.source_samples)),
             None if self.bending is None else (self.mobius, self.bending.offset),
         )
 

@@ -34,6 +34,24 @@ MOBIUS = np.array([2.891, -1.415, -4.458, 0.0, -4.952, 0.0, 0.0])
 """The same for Möbius maps: 0.01 to 0.24 away, in bins 0.02 to 0.24."""
 
 
+FITTED = 100
+"""Source points of the maps that the coefficients were fitted to."""
+
+SURE = 1.645
+"""Standard errors up to which chance may reach: one-sided, 95 %."""
+
+
+def unmatched_share(matched: float, count: int) -> float:
+    """Return the share of `count` samples, of which `matched` matched, that were not, as it counts beside `FITTED`.
+
+    A Möbius transformation has three parameters, so that three samples match whatever they are; and of fewer samples
+    the share is known less well. Both count as unmatched as far as they exceed what they are for `FITTED`.
+    """
+    share = 1 - matched / count
+    spread = SURE * np.sqrt(max(share * (1 - share), 0.0))
+    return float(share + max(3 / count - 3 / FITTED + spread * (count**-0.5 - FITTED**-0.5), 0.0))
+
+
 def probability(seen: Floats, *, bent: bool) -> Floats:
     """Return the probability, (q,), of an error below `BOUND` from evidence, (q, 7), for maps that were bent or not."""
     return expit(seen @ (DENSE if bent else MOBIUS))

@@ -101,6 +101,7 @@ def rival_of(found: Alignment, known: list[Mobius], enough: float | None, clock:
         z_max=found.settings.z_max,
         enough=enough,
         time_limit=found.settings.time_limit,
+        threads=found.settings.threads,
         progress=clock.searching(0.15),
     )
     if rival is None:
@@ -138,6 +139,7 @@ def _searched(
             weights=problem.weights,
             z_max=settings.z_max,
             time_limit=settings.time_limit,
+            threads=settings.threads,
             progress=clock.searching(0.35 / len(sides)),
         )
         if result.cancelled:

@@ -15,6 +15,7 @@ from ..stages import Part
 from ..surface.mesh import Booleans, Floats, Integers, MeshError
 from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
+from .confidence import SURE
 from .mobius_map import roughly_aligned
 from .overlap import Piece, shared
 from .prepared import Surface
@@ -22,9 +23,6 @@ from .refine import refined
 
 SMALLEST_OVERLAP = 0.1
 """Share of either surface's area below which an overlap is no ground to go on from."""
-
-SURE = 1.645
-"""Standard errors by which the overlap has to match better by itself than the whole surfaces: one-sided, 95 %."""
 
 
 def overlap_of(

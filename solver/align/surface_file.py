@@ -19,10 +19,11 @@ _KIND = "mobius surface 1"
 def save_surface(path: Path | str, surface: Surface) -> None:
     """Write a surface with all that has been computed of it, and its flattening in any case.
 
-    Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came, keys (n, d); fill_holes,
-    largest_part, outer_vertex (-1: none); computed (q, 3), the vertices as they are computed with; disc (q,) complex;
-    boundary, holes one after another and hole_sizes; flips_repaired, rim_lost; descriptors (q, d); and source_COUNT and
-    target_COUNT, the points chosen for each count. What is put in order is put in order again when the file is read.
+    Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came, keys (n, d), within
+    (n,); fill_holes, largest_part, outer_vertex (-1: none); computed (q, 3), the vertices as they are computed with;
+    disc (q,) complex; boundary, holes one after another and hole_sizes; flips_repaired, rim_lost; descriptors (q, d);
+    and source_COUNT and target_COUNT, the points chosen for each count. What is put in order is put in order again when
+    the file is read.
     """
     flat = surface.flattening
     chosen = {f"{role}_{count}": points for role, counts in surface.points.items() for count, points in counts.items()}
@@ -35,6 +36,7 @@ def save_surface(path: Path | str, surface: Surface) -> None:
             vertices=surface.original.vertices,
             faces=surface.original.faces,
             **({} if surface.keys is None else {"keys": surface.keys}),
+            **({} if surface.within is None else {"within": surface.within}),
             fill_holes=surface.fill_holes,
             largest_part=surface.largest_part,
             outer_vertex=-1 if surface.outer_vertex is None else surface.outer_vertex,
@@ -76,6 +78,8 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     _require(original.fingerprint == str(stored["fingerprint"]), "the mesh is not the one that was prepared")
     keys = stored["keys"].astype(np.float64, casting="safe") if "keys" in stored else None
     _require(keys is None or (keys.ndim == 2 and len(keys) == len(original.vertices)), "keys")
+    within = stored["within"].astype(np.bool_, casting="safe") if "within" in stored else None
+    _require(within is None or within.shape == (len(original.vertices),), "within")
     outer = int(stored["outer_vertex"])
     surface = Surface(
         original,
@@ -83,6 +87,7 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
         outer_vertex=None if outer < 0 else outer,
         largest_part=bool(stored["largest_part"]),
         keys=keys,
+        within=within,
     )
     mesh = surface.cleaned.mesh
     size, computed = len(mesh.vertices), stored["computed"]

@@ -80,11 +80,32 @@ def correspond(alignment: Alignment) -> Correspondence:
 
 def _in_own_triangles(face: Integers, barycentric: Floats, tidy: Cleaned) -> tuple[Integers, Floats]:
     """Return places on a source that was put in order as places on the source as it came."""
+    face, barycentric = _beside_missing(face, barycentric.copy(), tidy)
     located = face >= 0
-    barycentric = barycentric.copy()
     turned = located & tidy.reversed[face]
     barycentric[turned] = barycentric[turned][:, [0, 2, 1]]
     return np.where(located, tidy.faces[face], -1), barycentric
+
+
+def _beside_missing(face: Integers, barycentric: Floats, tidy: Cleaned) -> tuple[Integers, Floats]:
+    """Return places on the source, of those in a face that the source as it came lacks the nearest on its edge."""
+    lost = np.flatnonzero((face >= 0) & (tidy.faces[face] < 0))
+    if not lost.size:
+        return face, barycentric
+    face, mesh, row = face.copy(), tidy.mesh, np.arange(len(lost))
+    corner = np.argmin(barycentric[lost], axis=1)
+    twin = mesh.twins[3 * face[lost] + corner]
+    ends = mesh.faces[face[lost], (corner + 1) % 3]
+    share = np.stack([barycentric[lost, (corner + step) % 3] for step in (1, 2)], axis=1)
+    share /= share.sum(axis=1, keepdims=True)
+    there, side = np.divmod(twin, 3)
+    other = np.zeros((len(lost), 3))
+    # the twin runs the other way: its second end is where this side begins
+    first = mesh.faces[there, (side + 2) % 3] == ends
+    other[row, (side + 2) % 3] = np.where(first, share[:, 0], share[:, 1])
+    other[row, (side + 1) % 3] = np.where(first, share[:, 1], share[:, 0])
+    face[lost], barycentric[lost] = there, other
+    return face, barycentric
 
 
 def in_openings(flattening: Flattening, places: Complexes, face: Integers, barycentric: Floats) -> Booleans:

@@ -55,6 +55,11 @@ def cleaned(
     >>> result.mesh.faces.tolist(), result.changes
     ([[0, 1, 2], [0, 2, 3]], ('1 face with a vertex used twice left out', '1 face turned over'))
     """
+    found = _cleaned(mesh, largest_part, fill_holes, keys)
+    return found.without_pinholes() if fill_holes else found
+
+
+def _cleaned(mesh: TriangleMesh, largest_part: bool, fill_holes: bool, keys: Floats | None) -> Cleaned:
     work = _Work(mesh, largest_part)
     if work.in_order_but_for_sides(keys):
         return work.result()

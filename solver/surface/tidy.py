@@ -8,7 +8,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from .mesh import Booleans, Floats, Integers, TriangleMesh
+from .gluing import glue_of, vertices_of_glue
+from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, directed_edges, plural
 
 Value = TypeVar("Value", bound=np.generic)
 
@@ -23,7 +24,7 @@ class Cleaned:
         The original itself where there was nothing to do. Its first vertices are the original's, in use or not, so that
         their numbers keep their meaning; further ones are where a vertex of the original has become several.
     faces : (m,) int
-        The original face that each face was.
+        The original face that each face was; -1 for one that was put where a single one is missing.
     reversed : (m,) bool
         Faces whose second and third corners changed places.
     changes : tuple of str
@@ -34,6 +35,8 @@ class Cleaned:
         The vertex that each original vertex became; -1 where it is in no face that was kept.
     origin : (n,) int
         The original vertex of each vertex; for the first ones themselves.
+    share : float
+        Of the area of the surface that this is a piece of, if it was cut out of one; 1 for the whole.
     """
 
     mesh: TriangleMesh
@@ -43,6 +46,7 @@ class Cleaned:
     original_faces: Integers
     vertex_of: Integers
     origin: Integers
+    share: float = 1.0
 
     @staticmethod
     def unchanged(mesh: TriangleMesh) -> Cleaned:
@@ -55,6 +59,37 @@ class Cleaned:
         """Return it with all faces turned round."""
         mesh = TriangleMesh(self.mesh.vertices, self.mesh.faces[:, [0, 2, 1]], self.mesh.name)
         return replace(self, mesh=mesh, reversed=~self.reversed)
+
+    def only(self, chosen: Booleans, said: str) -> Cleaned:
+        """Return what some of its faces, (m,), are by themselves, and `said` among the changes."""
+        mesh = self.mesh
+        glue = glue_of(mesh.faces, mesh.twins).among(chosen)
+        faces, vertex_of, origin = vertices_of_glue(mesh.faces[chosen], glue, len(mesh.vertices))
+        return replace(
+            self,
+            mesh=TriangleMesh(mesh.vertices[origin], faces, mesh.name),
+            faces=self.faces[chosen],
+            reversed=self.reversed[chosen],
+            changes=(*self.changes, said),
+            vertex_of=np.where(self.vertex_of >= 0, vertex_of[self.vertex_of], -1),
+            origin=self.origin[origin],
+            share=self.share * float(mesh.face_areas[chosen].sum() / mesh.area),
+        )
+
+    def without_pinholes(self) -> Cleaned:
+        """Return it with a face in each opening of three edges, but for the longest boundary."""
+        mesh = self.mesh
+        loops = pinholes(mesh)
+        if not len(loops):
+            return self
+        said = f"{plural(len(loops), 'missing triangle')} put in"
+        return replace(
+            self,
+            mesh=TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, loops]), mesh.name),
+            faces=np.concatenate([self.faces, np.full(len(loops), -1)]),
+            reversed=np.concatenate([self.reversed, np.zeros(len(loops), bool)]),
+            changes=(*self.changes, said),
+        )
 
     @property
     def size(self) -> int:
@@ -77,7 +112,8 @@ class Cleaned:
         result = self.at_vertices(values, absent)[self.original_faces]
         own = values[self.mesh.faces]
         own[self.reversed] = own[self.reversed][:, [0, 2, 1]]
-        result[self.faces] = own
+        kept = self.faces >= 0
+        result[self.faces[kept]] = own[kept]
         return result
 
     def vertices_for(self, original: Integers) -> Integers:
@@ -96,3 +132,40 @@ class Cleaned:
         """
         areas = self.mesh.vertex_areas
         return np.bincount(self.origin, areas, self.size).astype(np.float64, copy=False) if self.changes else areas
+
+
+def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
+    """Return the largest piece of a mesh in order that lies among some of the original's vertices, (n_original,).
+
+    Raises
+    ------
+    MeshError
+        No face does.
+    """
+    mesh = tidy.mesh
+    chosen = inside[tidy.origin][mesh.faces].all(axis=1)
+    if not chosen.any():
+        raise MeshError(f"'{mesh.name}' has no face among the vertices that it was to be cut to: choose others")
+    place = np.flatnonzero(chosen)
+    part = glue_of(mesh.faces, mesh.twins).among(chosen).parts(len(place))
+    area = np.bincount(part, mesh.face_areas[place])
+    chosen[place[part != np.argmax(area)]] = False
+    share = float(mesh.face_areas[chosen].sum() / mesh.area)
+    return tidy.only(chosen, f"cut to a piece of {share:.1%} of its area, as asked; the rest has no counterpart")
+
+
+def pinholes(mesh: TriangleMesh) -> Integers:
+    """Return the openings of three edges of a manifold mesh as the faces that are missing there, (k, 3).
+
+    None where the mesh has no other boundary.
+    """
+    start, stop = directed_edges(mesh.faces)[mesh.twins < 0].T
+    ahead = np.full(len(mesh.vertices), -1)
+    ahead[start] = stop
+    second = ahead[start]
+    third = ahead[second]
+    once = np.bincount(start, minlength=len(ahead)) == 1  # where parts touch nothing is clear
+    around = (ahead[third] == start) & once[start] & once[second] & once[third] & (start < np.minimum(second, third))
+    if 3 * int(around.sum()) == len(start):
+        return np.empty((0, 3), np.intp)
+    return np.stack([start, third, second], axis=1)[around]

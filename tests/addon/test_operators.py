@@ -368,10 +368,10 @@ def choose(*objects: Any) -> None:
     activate(objects[-1])
 
 
-def test_two_selected_meshes_are_aligned_and_the_active_one_receives(pair: tuple[Any, Any]) -> None:
+def test_two_selected_meshes_are_aligned_and_the_active_one_gives(pair: tuple[Any, Any]) -> None:
     source, target = pair
     bpy.context.scene.mobius.source = bpy.context.scene.mobius.target = None
-    choose(source, target)
+    choose(target, source)
     assert bpy.ops.mobius.conformal_transfer(**QUICK | {"refine": "mobius"}) == {"FINISHED"}
     assert np.abs(weights(target, "Right") - (positions(target)[:, 0] + 1) / 2).max() < 0.1
     settings = bpy.context.scene.mobius
@@ -385,7 +385,7 @@ def test_a_known_alignment_is_not_searched_for_again(pair: tuple[Any, Any], monk
     calls: list[int] = []
     computed = align.aligned
     monkeypatch.setattr(align, "aligned", lambda *a, **k: (calls.append(1), computed(*a, **k))[1])
-    choose(*pair)
+    choose(*reversed(pair))
     bpy.ops.mobius.conformal_transfer(**QUICK)
     bpy.ops.mobius.conformal_transfer(**QUICK, mix="add")
     assert len(calls) == 1
@@ -398,7 +398,7 @@ def test_a_known_alignment_is_not_searched_for_again(pair: tuple[Any, Any], monk
 
 
 def test_nothing_is_written_where_there_is_nothing_to_carry(pair: tuple[Any, Any]) -> None:
-    choose(*pair)
+    choose(*reversed(pair))
     before = [everything(obj) for obj in pair]
     with pytest.raises(RuntimeError, match="'Source' has no color attributes to transfer"):
         bpy.ops.mobius.conformal_transfer(**QUICK, kinds={"COLORS"})
@@ -411,7 +411,7 @@ def test_a_failure_of_the_transfer_takes_the_alignment_back(
     from mobius_extension.mobius_addon.attributes import plan
 
     source, target = pair
-    choose(*pair)
+    choose(*reversed(pair))
     names = [mesh.name for mesh in bpy.data.meshes]
     before = [everything(obj) for obj in pair]
     write = plan._write
@@ -446,7 +446,7 @@ def test_a_failure_of_storing_takes_back_what_align_has_written(
 
 def test_the_selection_has_to_be_two_meshes(pair: tuple[Any, Any]) -> None:
     choose(pair[0])
-    with pytest.raises(RuntimeError, match="Select two meshes, the target last: it is the active one"):
+    with pytest.raises(RuntimeError, match="Select two meshes, the source last: it is the active one"):
         bpy.ops.mobius.conformal_transfer()
     empty = bpy.data.objects.new("Empty", None)
     bpy.context.scene.collection.objects.link(empty)
@@ -497,7 +497,7 @@ def test_one_undo_takes_back_align_on_both_meshes_and_then_transfer_is_refused(p
 
 
 def test_one_undo_takes_back_alignment_and_transfer_in_one_go(pair: tuple[Any, Any]) -> None:
-    choose(*pair)
+    choose(*reversed(pair))
     undone_by_one_step(["Source", "Target"], lambda *how: bpy.ops.mobius.conformal_transfer(*how, **QUICK))
 
 

@@ -37,9 +37,9 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.notes.append(text)
 
-    def prop(self, owner: Any, name: str, **_: Any) -> None:
+    def prop(self, owner: Any, name: str, *, text: str = "", **_: Any) -> None:
         assert name in owner.bl_rna.properties, name
-        self.notes.append(name)
+        self.notes.append(text if name.startswith("carry_") and text else name)
 
     def prop_enum(self, owner: Any, name: str, value: str, **_: Any) -> None:
         assert value in owner.bl_rna.properties[name].enum_items
@@ -113,7 +113,7 @@ def test_an_edit_changes_the_line() -> None:
 
 def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
-    assert len(panels) == 7
+    assert len(panels) == 10
     for settings in ({"source": None}, {"source": pair[0]}):
         for name, value in settings.items():
             setattr(bpy.context.scene.mobius, name, value)
@@ -124,7 +124,7 @@ def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     settings.layers = settings.source_mask = settings.target_mask = "named"
     bpy.context.window_manager.mobius_view.matches = True
     for cls in panels:
-        assert drawn(cls)
+        assert drawn(cls) or cls is panel.MOBIUS_PT_last_transfer
     bpy.context.window_manager.mobius_view.matches = False
 
 
@@ -276,6 +276,70 @@ def test_german_covers_the_interface() -> None:
     for english, german in GERMAN.items():
         assert fields(english) == fields(german), english
         assert english.endswith(":") == german.endswith(":"), english
+
+
+# kinds of data
+
+
+def test_kinds_are_checkboxes_with_counts(pair: tuple[Any, Any]) -> None:
+    settings = bpy.context.scene.mobius
+    settings.carry_none = True
+    assert settings.kinds == set()
+    assert settings.carry_none
+    assert not settings.carry_all
+    settings.carry_vertex_groups = True
+    settings.carry_uv = True
+    assert settings.kinds == {"VERTEX_GROUPS", "UV"}
+    settings.carry_uv = False
+    assert settings.kinds == {"VERTEX_GROUPS"}
+    said = drawn(panel.MOBIUS_PT_transfer)
+    assert {"carry_all", "carry_none", "Vertex Groups 1", "UV Maps 1", "Shape Keys 0", "Materials"} <= set(said)
+    bpy.ops.mobius.align(**QUICK)
+    bpy.ops.mobius.transfer(kinds=settings.kinds)
+    assert not pair[1].data.uv_layers.get("UVMap")
+    settings.carry_all = True
+    assert len(settings.kinds) == 12
+
+
+def test_the_selection_is_used_from_active_to_selected(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    settings = bpy.context.scene.mobius
+    settings.source = settings.target = None
+    for obj in pair:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = source
+    assert bpy.ops.mobius.use_selected() == {"FINISHED"}
+    assert (settings.source, settings.target) == (source, target)
+    target.select_set(False)
+    with pytest.raises(RuntimeError, match="Select two meshes, the source last"):
+        bpy.ops.mobius.use_selected()
+
+
+# after a transfer
+
+
+def test_the_last_transfer_stands_in_the_panel_layer_by_layer(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    for number in range(10):
+        source.vertex_groups.new(name=f"Group {number}").add((number,), 0.5, "REPLACE")
+    target.vertex_groups.new(name="Right").add((1, 2), 0.25, "REPLACE")
+    target.vertex_groups.new(name="Group 0").lock_weight = True
+    bpy.ops.mobius.align(**QUICK)
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    bpy.ops.ed.undo_push(message="aligned")
+    bpy.ops.mobius.transfer("EXEC_DEFAULT", True, kinds={"VERTEX_GROUPS", "UV"})
+    assert panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    said = drawn(panel.MOBIUS_PT_last_transfer)
+    for text in ("From 'Source'", "Vertex Groups: 10", "UV Maps: 1", "UVMap", "Right → Right.001", "and 2 more"):
+        assert text in said
+    assert "Group 0" not in said
+    together = " ".join(said)
+    assert "'Group 0' is locked on 'Target' and left as it is" in together
+    assert "'Target' keeps its own vertex group 'Right'" in together
+    bpy.ops.ed.undo()
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    bpy.context.scene.mobius.target.data.mobius_transferred = '{"layers": 3}'
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
 
 
 # before a transfer

@@ -58,7 +58,7 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     assert not target.data.mobius_alignment.target_fingerprint
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in (source, target))
-    bpy.context.view_layer.objects.active = target
+    bpy.context.view_layer.objects.active = source
     bpy.ops.ed.undo_push(message="selection")
 
     def conformal_transfer() -> Wait:

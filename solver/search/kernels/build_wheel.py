@@ -1,4 +1,4 @@
-"""Build the wheel `mobius_kernels`: kernels.c as shared libraries, for this platform or for all.
+"""Build the wheel `mobius_kernels`: kernels.c and texels.c as shared libraries, for this platform or for all.
 
 A build backend (PEP 517), so that installing this folder compiles it, and a command::
 
@@ -23,6 +23,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = "mobius_kernels"
+SOURCES = ("kernels.c", "texels.c")
 # without contraction and reassociation every machine computes the same numbers; errno and traps are not looked at
 FLAGS = ["-std=c11", "-O3", "-shared", "-Wall", "-Wextra", "-Werror"]
 FLAGS += ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-s"]
@@ -74,7 +75,11 @@ def compile_library(target: Platform, processor: str, output: Path) -> None:
         command.append("-fPIC")
     if target.ending == "dylib":
         command.append(f"-Wl,-install_name,@rpath/{output.name}")  # else the folder it was compiled in
-    done = subprocess.run([*command, str(HERE / "kernels.c"), "-o", str(output)], capture_output=True, text=True)
+    done = subprocess.run(
+        [*command, *(str(HERE / source) for source in SOURCES), "-lm", "-o", str(output)],
+        capture_output=True,
+        text=True,
+    )
     if done.returncode:
         raise SystemExit(f"compiling the kernels for {target.tag} failed:\n{done.stderr}")
 

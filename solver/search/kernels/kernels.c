@@ -220,12 +220,15 @@ static void images(int64_t n, const double *restrict mx, const double *restrict 
 
 /* ../bounds.py: widest_half_angle, in turns. The widest circle is that of the tangents' length, if it is in reach. */
 static inline double pair_half_width(const Pair *pair, double near, double far, double tolerance) {
-    double rho = near, b = pair->b, e = pair->e;
+    double rho = near, b = pair->b, e = pair->e, rest = 0x1p-48;
     if (pair->tangent >= 0) {
         if (far < pair->tangent) rho = far;
         else if (near <= pair->tangent) return pair->wide;
-    } else if (near < 0x1p-7) return 1; /* the disc holds the centre, or nearly so */
-    double q = ((e - (b - rho)) * (e + (b - rho)) + 0x1p-48) / (4 * rho * b) * (1 + 0x1p-48);
+    } else { /* the disc holds the centre, or nearly so */
+        if (near <= -pair->tangent) return 1;
+        rest = 0x1p-44 * e;
+    }
+    double q = ((e - (b - rho)) * (e + (b - rho)) + rest) / (4 * rho * b) * (1 + 0x1p-48);
     if (!(q < 1)) return 1;
     if (!(q > 0)) return 0;
     double s = __builtin_sqrt(q);

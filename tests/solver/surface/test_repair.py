@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from damages import (
+    Damaged,
     bow_ties,
     closed_lips,
     debris,
@@ -17,7 +18,6 @@ from damages import (
     islands,
     loose_triangles,
     mirror_halves,
-    pinholes,
     slit,
     some_turned,
     spikes,
@@ -44,12 +44,13 @@ def repaired(damage, sheet: TriangleMesh, seed: int = 3, **asked: bool) -> Verdi
     # the first vertices and the faces are still told by their numbers
     assert tidy.size == len(new.mesh.vertices)
     assert (tidy.origin[: tidy.size] == np.arange(tidy.size)).all()
-    own = new.mesh.faces[tidy.faces].copy()
-    own[tidy.reversed] = own[tidy.reversed][:, [0, 2, 1]]
+    kept = tidy.faces >= 0
+    own = new.mesh.faces[tidy.faces[kept]].copy()
+    own[tidy.reversed[kept]] = own[tidy.reversed[kept]][:, [0, 2, 1]]
     if damage is edges_without_length:
-        assert (new.mesh.vertices[tidy.origin[tidy.mesh.faces]] == new.mesh.vertices[own]).all()
+        assert (new.mesh.vertices[tidy.origin[tidy.mesh.faces[kept]]] == new.mesh.vertices[own]).all()
     else:
-        assert (new.clean[tidy.origin[tidy.mesh.faces]] == new.clean[own]).all()
+        assert (new.clean[tidy.origin[tidy.mesh.faces[kept]]] == new.clean[own]).all()
     return found
 
 
@@ -82,8 +83,25 @@ def test_a_repaired_disc_is_the_disc_it_was(damage, seed: int, sheet: TriangleMe
         assert found.repairs
 
 
-def test_pinholes_and_bow_ties_become_openings(sheet: TriangleMesh) -> None:
-    assert repaired(pinholes, sheet).repairs[-1].endswith("(3, 3, 3 edges) closed")
+def test_missing_triangles_are_put_in(sheet: TriangleMesh) -> None:
+    rim = np.isin(sheet.faces, topology(sheet).boundary_loops[0]).any(axis=1)
+    gone = np.flatnonzero(~rim)[[10, 200, 400]]
+
+    def pierced(old: Damaged, _rng: np.random.Generator) -> Damaged:
+        return Damaged(TriangleMesh(old.mesh.vertices, np.delete(old.mesh.faces, gone, axis=0), "Pierced"), old.clean)
+
+    found = repaired(pierced, sheet)
+    assert found.repairs == ("3 missing triangles put in",)
+    first = [{tuple(np.roll(face, -int(np.argmin(face)))) for face in x.faces} for x in (sheet, found.tidy.mesh)]
+    assert first[0] == first[1]
+    # corners of the faces as they came, the added ones are none of these
+    corners = found.tidy.at_corners(np.arange(len(sheet.vertices)), -1)
+    assert (corners == found.tidy.original_faces).all()
+    with pytest.raises(MeshError, match="4 boundary loops"):
+        verdict(pierced(undamaged(sheet), np.random.default_rng()).mesh, fill_holes=False)
+
+
+def test_bow_ties_become_openings(sheet: TriangleMesh) -> None:
     found = repaired(bow_ties, sheet)
     assert found.repairs == ("1 vertex split in which parts touch in a point only", "1 opening (6 edges) closed")
     tidy, n = found.tidy, len(sheet.vertices)
@@ -118,7 +136,7 @@ def test_holes_in_both_sides_of_cloth_do_not_join_them(sheet: TriangleMesh) -> N
     back = np.delete(faces, beside, axis=0)[:, [0, 2, 1]] + n
     both = np.concatenate([np.delete(faces, inner, axis=0), back])
     cloth = TriangleMesh(np.concatenate([sheet.vertices] * 2), both, "Cloth")
-    assert verdict(cloth).repairs == ("1 smaller part left out", "1 opening (3 edges) closed")
+    assert verdict(cloth).repairs == ("1 smaller part left out", "1 missing triangle put in")
 
 
 def test_a_surface_that_was_cut_open_on_purpose_stays_open() -> None:
@@ -150,7 +168,7 @@ def test_a_surface_that_was_cut_open_on_purpose_stays_open() -> None:
 
 def test_a_thin_handle_is_cut_and_a_wide_one_refused(sheet: TriangleMesh) -> None:
     found = repaired(handle, sheet)
-    assert found.repairs == ("1 handle cut through", "2 openings (3, 3 edges) closed")
+    assert found.repairs == ("1 handle cut through", "2 missing triangles put in")
     with pytest.raises(MeshError, match="has 1 handle like a torus"):
         repaired(handle, sheet, fill_holes=False)
     n = 24

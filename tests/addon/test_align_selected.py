@@ -1,0 +1,58 @@
+"""Several targets as one job: each is written, what fails is named, and one undo takes all back."""
+
+import numpy as np
+import pytest
+from scenes import QUICK, corner_values, make_sheet
+
+bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
+
+from mobius_extension.mobius_addon import stored_alignment  # noqa: E402
+from mobius_extension.mobius_addon.jobs import Job  # noqa: E402
+
+
+def choose(source, *targets) -> None:
+    bpy.context.scene.mobius.source = source
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in (source, *targets))
+
+
+def test_all_selected_targets_share_the_layout_of_the_source() -> None:
+    source, first, second, other = (make_sheet(name, n) for name, n in (("S", 15), ("A", 11), ("B", 12), ("C", 9)))
+    choose(source, first, second)
+    assert bpy.ops.mobius.align_selected(**QUICK) == {"FINISHED"}
+    layout = source.data.uv_layers.active
+    assert layout is not None
+    places = {}
+    for obj in (source, first, second):
+        uv = corner_values(obj, layout.name)
+        corner = np.array([obj.data.vertices[loop.vertex_index].co[:2] for loop in obj.data.loops])
+        places[obj.name] = corner, uv
+    # the same place of the sheet is at the same place of the layout
+    for name in ("A", "B"):
+        assert stored_alignment.exists(bpy.data.objects[name], source)
+        corner, uv = places[name]
+        apart = np.linalg.norm(corner[:, None] - places["S"][0], axis=2)
+        error = np.linalg.norm(uv - places["S"][1][apart.argmin(axis=1)], axis=1)
+        assert np.median(error[apart.min(axis=1) < 0.04]) < 0.06
+    assert not stored_alignment.exists(other, source)
+    assert Job.current is None
+
+
+def test_one_that_cannot_be_aligned_does_not_stop_the_others() -> None:
+    source, target = make_sheet("S", 15), make_sheet("A", 11)
+    bpy.ops.mesh.primitive_ico_sphere_add()
+    ball = bpy.context.object
+    choose(source, ball, target)
+    assert bpy.ops.mobius.align_selected(**QUICK) == {"FINISHED"}
+    assert stored_alignment.exists(target, source)
+    assert not stored_alignment.exists(ball, source)
+    choose(source, ball)
+    with pytest.raises(RuntimeError, match="None of the selected meshes"):
+        bpy.ops.mobius.align_selected(**QUICK)
+
+
+def test_without_a_target_it_says_what_to_select() -> None:
+    source = make_sheet("S", 8)
+    choose(source)
+    with pytest.raises(RuntimeError, match="Select the meshes that 'S' is to be aligned with"):
+        bpy.ops.mobius.align_selected(**QUICK)
