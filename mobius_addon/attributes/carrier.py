@@ -156,7 +156,7 @@ class Carrier:
             carried = self._gradients(values)
             if self.contacts:
                 carried = brought_together(self._gradients, carried, self._gradients.moved_places(values))
-            return self._filled(carried)
+            return self.filled(carried)
         rotation, scale = self._similarities
         carried = self._matrix @ values
         return self.filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])

@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from mobius_addon.attributes.expression_names import MIDDLE, PAIRED, VISEMES, WHOLE, renamed, spelled, understood
+pytest.importorskip("bpy")
+from mobius_extension.mobius_addon.attributes.expression_names import (
+    MIDDLE,
+    PAIRED,
+    VISEMES,
+    WHOLE,
+    renamed,
+    spelled,
+    understood,
+)
 
 
 def test_there_are_52_and_every_spelling_of_each_is_understood() -> None:
@@ -43,9 +52,9 @@ def test_where_the_map_mirrors_sides_change_places() -> None:
 
 
 def test_halves_arrive_as_one_key_under_its_name() -> None:
-    from scenes import add_key, make_sheet, positions, same_vertices, shape
-
-    from mobius_addon.attributes import TransferSettings, plan_transfer
+    from mobius_extension.mobius_addon.attributes import TransferSettings, plan_transfer
+    from scenes import make_sheet, positions
+    from test_transfer_shape_keys import add_key, same_vertices, shape
 
     source, target = make_sheet("Source", 12), make_sheet("Target", 12)
     left, right = (np.tile([0.0, 0.0, height], (144, 1)) for height in (0.1, 0.2))
