@@ -48,6 +48,9 @@ class Elsewhere:
 
 
 def _tasks(name: str) -> Any:
+    if __package__:
+        return getattr(importlib.import_module(".tasks", __package__), name)
+    # in a process of its own, which has run this file: Blender's is left as it is
     folder = Path(__file__).resolve().parent
     root = str(folder.parents[1])
     if root not in sys.path:
