@@ -29,7 +29,7 @@ def other_mains(source: Surface, target: Surface) -> list[tuple[Surface, Surface
 
 
 def _with_other_mains(surface: Surface) -> list[Surface]:
-    if surface.within is not None:
+    if surface.within is not None or not surface.largest_part:
         return []
     try:
         parts, found = surface.parts, []
