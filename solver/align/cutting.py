@@ -16,6 +16,7 @@ from ..flatten.flatten import Flattening
 from ..stages import Part
 from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
 from ..surface.necks import Neck, necks
+from ..surface.topology import topology
 from .dense import drafted_from
 from .mobius_map import roughly_aligned
 from .prepared import Surface
@@ -70,7 +71,8 @@ def _why_cut(surface: Surface) -> str | None:
     try:
         share = shrunk(surface.flattening)
     except MeshError:
-        return "is too deep or narrow for one disc"
+        other = topology(surface.cleaned.mesh).problems(fill_holes=surface.fill_holes)
+        return None if other else "is too deep or narrow for one disc"  # what is wrong with it is said elsewhere
     if share > MUCH:
         return f"is too deep for one disc, where {share:.0%} of it would shrink by more than a million"
     return None
