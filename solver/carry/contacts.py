@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
-from .gradients import GradientTransfer
+from .gradients import GradientTransfer, parts_of
 
 CLOSED = 0.3
 """Points meet that are left apart by less than this share of how far they were.
@@ -161,11 +161,13 @@ def brought_together(transfer: GradientTransfer, carried: Floats, moved: Floats)
     behind it no deeper than there. It may slide. Of all corrections the one is taken that the system of `transfer`
     resists least, where each vertex counts as far as it moves: in a blink the upper lid gives way, and the brow stays.
     It is found in terms of the forces at the contacts, softened so that contacts that contradict each other share the
-    difference, and once more for what lies beside the vertices then.
+    difference, and once more for what lies beside the vertices then. Only the largest part meets itself: teeth, eyes
+    and lashes lie beside others without touching them, and would be moved as a whole.
     """
     if not moved.any():
         return carried
     places, faces = transfer.target.vertices, transfer.target.faces
+    faces = faces[parts_of(transfer.target)[1] == 0]
     there = find_contacts(transfer.places, moved, faces)
     if len(there.vertex) == 0:
         return carried

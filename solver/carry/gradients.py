@@ -177,18 +177,24 @@ def _tells(basis: Floats, target: TriangleMesh, scale: Floats) -> Booleans:
     return ratio > SQUEEZED**2
 
 
+def parts_of(target: TriangleMesh) -> tuple[Integers, Integers]:
+    """Return the number of the part that each vertex, (n,), and each triangle, (m,), is in; 0 is the largest."""
+    low, high = target.edges.T
+    size = len(target.vertices)
+    part = connected_components(csr_array((np.ones(len(low)), (low, high)), shape=(size, size)), directed=False)[1]
+    order = np.argsort(-np.bincount(part, target.vertex_areas), kind="stable")
+    number = np.argsort(order, kind="stable")[part]
+    return number, number[target.faces[:, 0]]
+
+
 def _masses(target: TriangleMesh) -> Floats:
     """Return how much the displacement itself counts at each vertex, (n,).
 
     In parts beside the largest only its mean counts: they turn and stretch as their gradients say.
     """
-    areas = target.vertex_areas
-    size = len(areas)
-    low, high = target.edges.T
-    part = connected_components(csr_array((np.ones(len(low)), (low, high)), shape=(size, size)), directed=False)[1]
+    areas, part = target.vertex_areas, parts_of(target)[0]
     own = np.bincount(part, areas)
     weight = np.full(len(own), 1e-3) / np.maximum(own, np.finfo(float).tiny)
-    main = int(own.argmax())
-    weight[main] = 1 / (REACH**2 * own[main])
+    weight[0] = 1 / (REACH**2 * own[0])
     mass = areas * weight[part]
     return np.maximum(mass, 1e-9 * mass.mean())

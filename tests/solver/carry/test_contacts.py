@@ -74,3 +74,12 @@ def test_what_meets_nothing_is_left_alone():
     carried = transfer(moved)
     assert (brought_together(transfer, carried, moved) == carried).all()
     assert (brought_together(transfer, 0 * carried, 0 * moved) == 0).all()
+
+
+def test_parts_that_lie_beside_each_other_are_left_alone():
+    whole = slit(0.2)
+    plates = whole.vertices[whole.faces][:, :, 0].min(axis=1) > 0.1  # without the bend that joins them
+    mesh = TriangleMesh(whole.vertices, whole.faces[plates])
+    moved = closing(mesh, 0.39)
+    assert len(find_contacts(mesh.vertices, moved, mesh.faces).vertex) > 10
+    assert brought_together(GradientTransfer.of(on_itself(mesh, 0), mesh, mesh), moved, moved) is moved
