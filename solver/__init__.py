@@ -7,8 +7,8 @@ onto the other surface (`bend`), aligned as a whole (`align`) and turned into a 
 
 from .align import Alignment, AlignSettings, Surface, align, load_surface, prepare, save_surface
 from .carry import Correspondence, correspond, interpolate, interpolate_corners, load_map, report, save_map
-from .flatten import Distortion, Flattening, flatten, silhouette_mesh
-from .mobius import Mobius
+from .flatten import Distortion, Flattening, SphereFlattening, flatten, flatten_sphere, silhouette_mesh
+from .mobius import Mobius, SphereMobius
 from .search import SearchResult, search
 from .stages import Cancelled, Progress, SearchProgress
 from .surface import Cleaned, MeshError, Topology, TriangleMesh, Verdict, cleaned, require_disc, topology, verdict
@@ -26,6 +26,8 @@ __all__ = [
     "Progress",
     "SearchProgress",
     "SearchResult",
+    "SphereFlattening",
+    "SphereMobius",
     "Surface",
     "Topology",
     "TriangleMesh",
@@ -34,6 +36,7 @@ __all__ = [
     "cleaned",
     "correspond",
     "flatten",
+    "flatten_sphere",
     "interpolate",
     "interpolate_corners",
     "load_map",
