@@ -9,7 +9,7 @@ from .align import Alignment, AlignSettings, Surface, align, load_surface, prepa
 from .carry import Correspondence, correspond, interpolate, interpolate_corners, load_map, report, save_map
 from .flatten import Distortion, Flattening, SphereFlattening, flatten, flatten_sphere, silhouette_mesh
 from .mobius import Mobius, SphereMobius
-from .search import SearchResult, search
+from .search import SearchResult, SphereSearchResult, search, sphere_search
 from .stages import Cancelled, Progress, SearchProgress
 from .surface import Cleaned, MeshError, Topology, TriangleMesh, Verdict, cleaned, require_disc, topology, verdict
 
@@ -28,6 +28,7 @@ __all__ = [
     "SearchResult",
     "SphereFlattening",
     "SphereMobius",
+    "SphereSearchResult",
     "Surface",
     "Topology",
     "TriangleMesh",
@@ -48,6 +49,7 @@ __all__ = [
     "save_surface",
     "search",
     "silhouette_mesh",
+    "sphere_search",
     "topology",
     "verdict",
 ]

@@ -16,6 +16,10 @@ from .injective import shrinkage, untangled
 CHART = 0.4
 """Cosine of the radius of a chart, some 66 degrees: beyond, a gnomonic chart stretches more than sixfold."""
 
+COARSE = 6
+"""Powers of 10 that areas shrink by up to which it is not numbers that fail: geodesics between few vertices, some of
+them far apart, cross where the straight lines of the plane do not."""
+
 MOST_CHARTS = 100
 """Repairs of places where triangles are turned over; more are no map to be repaired."""
 
@@ -35,9 +39,12 @@ def require_injective(mesh: TriangleMesh, sphere: Floats) -> None:
     else:
         what = "parts of it would be lost"
     covered = np.abs(solid_angles(np.nan_to_num(sphere), mesh.faces)) / (4 * np.pi)
+    power = shrinkage(mesh, covered)
+    if power < COARSE:
+        raise MeshError(f"'{mesh.name}' is too coarse for a map to the sphere: {what}: subdivide it")
     raise MeshError(
-        f"'{mesh.name}' juts out too far for a sphere: {what}, as parts shrink to 1/10^{shrinkage(mesh, covered)} of "
-        "their area there: cut off what juts out, as arms and legs"
+        f"'{mesh.name}' juts out too far for a sphere: {what}, as parts shrink to 1/10^{power} of their area there: "
+        "cut off what juts out, as arms and legs"
     )
 
 

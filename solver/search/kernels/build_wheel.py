@@ -23,6 +23,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = "mobius_kernels"
+SOURCES = ("kernels.c", "sphere.c")
 # without contraction and reassociation every machine computes the same numbers; errno and traps are not looked at
 FLAGS = ["-std=c11", "-O3", "-shared", "-Wall", "-Wextra", "-Werror"]
 FLAGS += ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-s"]
@@ -74,7 +75,9 @@ def compile_library(target: Platform, processor: str, output: Path) -> None:
         command.append("-fPIC")
     if target.ending == "dylib":
         command.append(f"-Wl,-install_name,@rpath/{output.name}")  # else the folder it was compiled in
-    done = subprocess.run([*command, str(HERE / "kernels.c"), "-o", str(output)], capture_output=True, text=True)
+    done = subprocess.run(
+        [*command, *(str(HERE / name) for name in SOURCES), "-o", str(output)], capture_output=True, text=True
+    )
     if done.returncode:
         raise SystemExit(f"compiling the kernels for {target.tag} failed:\n{done.stderr}")
 
