@@ -85,22 +85,30 @@ def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
     True
     """
     require_sphere(mesh)
-    pole = _fattest(mesh)
     lengths = mollified_lengths(mesh.edge_lengths)
-    around = (mesh.faces == pole).any(axis=1)
-    faces = mesh.faces[~around]
-    twins = twin_sides(edges_of_sides(faces, len(mesh.vertices))[1])
-    boundary = _link(mesh.faces[around], pole)
-    disc = riemann_map(IntrinsicTriangulation(faces, lengths[~around], twins, len(mesh.vertices)), boundary)
-    disc = untangled(faces, lengths[~around], disc, boundary)
-    plane = _rounded(_scaled(disc, mesh, pole), faces, lengths[~around])
-    sphere = centred(_projected(plane, pole), mesh)
-    before = spherical_distortion(mesh, sphere).flips
-    if before:
+    for pole in _fattest(mesh):
+        sphere = centred(_from(mesh, lengths, pole), mesh)
+        before = spherical_distortion(mesh, sphere).flips
+        if not before:
+            break
+        # few large triangles around one vertex may cross as geodesics, and not around another
         sphere = centred(untangled_sphere(mesh, lengths, sphere), mesh)
+        if not spherical_distortion(mesh, sphere).flips:
+            break
     require_injective(mesh, sphere)
     sphere[~mesh.used] = np.nan
     return SphereFlattening(mesh, sphere, before)
+
+
+def _from(mesh: TriangleMesh, lengths: Floats, pole: int) -> Floats:
+    """Return the map, (n, 3), that takes out a vertex; it is not centred."""
+    around = (mesh.faces == pole).any(axis=1)
+    faces, lengths = mesh.faces[~around], lengths[~around]
+    twins = twin_sides(edges_of_sides(faces, len(mesh.vertices))[1])
+    boundary = _link(mesh.faces[around], pole)
+    disc = riemann_map(IntrinsicTriangulation(faces, lengths, twins, len(mesh.vertices)), boundary)
+    disc = untangled(faces, lengths, disc, boundary)
+    return _projected(_rounded(_scaled(disc, mesh, pole), faces, lengths), pole)
 
 
 def centred(sphere: Floats, mesh: TriangleMesh) -> Floats:
@@ -109,8 +117,11 @@ def centred(sphere: Floats, mesh: TriangleMesh) -> Floats:
     return moved / np.linalg.norm(moved, axis=1, keepdims=True)
 
 
-def _fattest(mesh: TriangleMesh) -> int:
-    """Return the vertex that on the whole is least far along edges from points that are far from each other."""
+def _fattest(mesh: TriangleMesh) -> list[int]:
+    """Return the vertex that on the whole is least far along edges from points that are far from each other; and more.
+
+    The others are for the case that the first will not do.
+    """
     graph, inside = edge_graph(mesh), np.flatnonzero(mesh.used)
     place = int(inside[0])
     total, nearest = np.zeros(len(mesh.vertices)), np.full(len(mesh.vertices), np.inf)
@@ -121,7 +132,8 @@ def _fattest(mesh: TriangleMesh) -> int:
             nearest = np.minimum(nearest, distance)
             distance = nearest
         place = int(inside[np.argmax(distance[inside])])
-    return int(inside[np.argmin(total[inside])])
+    order = inside[np.argsort(total[inside], kind="stable")]
+    return order[np.unique([0, len(order) // 8, len(order) // 4, len(order) // 2])].tolist()
 
 
 def _link(star: Integers, pole: int) -> Integers:
