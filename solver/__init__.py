@@ -8,9 +8,9 @@ Many surfaces at once are a `collection`.
 
 from .align import Alignment, AlignSettings, Surface, align, load_surface, prepare, save_surface
 from .carry import Correspondence, correspond, interpolate, interpolate_corners, load_map, report, save_map
-from .flatten import Distortion, Flattening, flatten, silhouette_mesh
-from .mobius import Mobius
-from .search import SearchResult, search
+from .flatten import Distortion, Flattening, SphereFlattening, flatten, flatten_sphere, silhouette_mesh
+from .mobius import Mobius, SphereMobius
+from .search import SearchResult, SphereSearchResult, search, sphere_search
 from .stages import Cancelled, Progress, SearchProgress
 from .surface import Cleaned, MeshError, Topology, TriangleMesh, Verdict, cleaned, require_disc, topology, verdict
 
@@ -27,6 +27,9 @@ __all__ = [
     "Progress",
     "SearchProgress",
     "SearchResult",
+    "SphereFlattening",
+    "SphereMobius",
+    "SphereSearchResult",
     "Surface",
     "Topology",
     "TriangleMesh",
@@ -35,6 +38,7 @@ __all__ = [
     "cleaned",
     "correspond",
     "flatten",
+    "flatten_sphere",
     "interpolate",
     "interpolate_corners",
     "load_map",
@@ -46,6 +50,7 @@ __all__ = [
     "save_surface",
     "search",
     "silhouette_mesh",
+    "sphere_search",
     "topology",
     "verdict",
 ]

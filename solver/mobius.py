@@ -1,9 +1,12 @@
-"""The automorphisms of the unit disc and the hyperbolic discs that they carry into each other."""
+"""The automorphisms of the unit disc and of the sphere; the hyperbolic discs that the former carry into each other."""
 
 from __future__ import annotations
 
 import cmath
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,6 +89,127 @@ class Mobius:
         return (1 - abs(self.z) ** 2) / np.abs(1 - x * np.conj(self.z)) ** 2
 
 
+@dataclass(frozen=True)
+class SphereMobius:
+    """A conformal (or, reflected, anticonformal) automorphism of the unit sphere: an element of PSL(2, C).
+
+    f(x) = R T_h(x), T_h(x) = (1 - |h|^2) (x - h) / |x - h|^2 - h; a reflected one is f((x, -y, z)). T_h carries h to
+    the centre of the ball and moves points of the sphere away from h. As 2 x 2 matrices acting on I + x.sigma, sigma
+    Pauli's matrices, T_h is I - h.sigma up to scale, and R the quaternion's matrix.
+
+    Parameters
+    ----------
+    h : (float, float, float)
+        A point of the open unit ball.
+    rotation : (float, float, float, float)
+        R as a quaternion (w, x, y, z) other than 0; its length does not matter: R x = q x conj(q) / |q|^2, exactly.
+    reflected : bool
+        Whether the sign of y is changed first.
+
+    Raises
+    ------
+    ValueError
+        |h| >= 1, the quaternion 0, or a parameter that is not finite.
+
+    Examples
+    --------
+    >>> f = SphereMobius((0.1, 0.2, 0.0), (1.0, 0.0, 0.5, 0.0))
+    >>> bool(np.abs(f.inverse()(f([[0.0, 0.6, 0.8]])) - [[0.0, 0.6, 0.8]]).max() < 1e-15)
+    True
+    """
+
+    h: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    reflected: bool = False
+
+    def __post_init__(self) -> None:
+        h, q = tuple(float(a) for a in self.h), tuple(float(a) for a in self.rotation)
+        fits = len(h) == 3 and len(q) == 4 and all(math.isfinite(a) for a in (*h, *q))
+        if not (fits and math.hypot(*h) < 1 and math.hypot(*q) > 1e-100):
+            raise ValueError(
+                f"a Möbius transformation of the sphere needs |h| < 1 and a quaternion other than 0, not h={self.h}, "
+                f"rotation={self.rotation}"
+            )
+        object.__setattr__(self, "h", h)
+        object.__setattr__(self, "rotation", q)
+
+    def __call__(self, x: npt.ArrayLike) -> Floats:
+        """Return the images of points of the sphere, (..., 3)."""
+        x = np.asarray(x, dtype=np.float64)
+        if self.reflected:
+            x = x * [1.0, -1.0, 1.0]
+        h = np.array(self.h)
+        away = x - h
+        with np.errstate(invalid="ignore"):  # nan (a vertex in no face) stays nan
+            moved = away * ((1 - h @ h) / (away**2).sum(axis=-1, keepdims=True)) - h
+        return moved @ self.matrix.T
+
+    @property
+    def matrix(self) -> Floats:
+        """R, (3, 3)."""
+        w, x, y, z = np.array(self.rotation) / math.hypot(*self.rotation)
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    def conjugate(self) -> SphereMobius:
+        """Return c f c, c the change of the sign of y, with the same `reflected`."""
+        (x, y, z), (w, a, b, c) = self.h, self.rotation
+        return SphereMobius((x, -y, z), (w, -a, b, -c), self.reflected)
+
+    def inverse(self) -> SphereMobius:
+        """Return the transformation that undoes this one."""
+        x, y, z = (-self.matrix @ np.array(self.h)).tolist()
+        w, a, b, c = self.rotation
+        back = SphereMobius((x, y, z), (w, -a, -b, -c))
+        return SphereMobius(*_parts(back.conjugate()), True) if self.reflected else back
+
+    def __matmul__(self, first: SphereMobius) -> SphereMobius:
+        """Return the composition: (a @ b)(x) = a(b(x))."""
+        inner = first.conjugate() if self.reflected else first
+        return _of_matrix(_spinor(self) @ _spinor(inner), self.reflected != first.reflected)
+
+    def derivative(self, x: npt.ArrayLike) -> Floats:
+        """Return the factor by which lengths grow at points x, (..., 3)."""
+        x = np.asarray(x, dtype=np.float64)
+        if self.reflected:
+            x = x * [1.0, -1.0, 1.0]
+        h = np.array(self.h)
+        return (1 - h @ h) / ((x - h) ** 2).sum(axis=-1)
+
+
+def _parts(mobius: SphereMobius) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    return mobius.h, mobius.rotation
+
+
+def _spinor(mobius: SphereMobius) -> Complexes:
+    """Return R T_h as a matrix, (2, 2), up to scale."""
+    (x, y, z), (w, a, b, c) = mobius.h, mobius.rotation
+    turn = np.array([[w - 1j * c, -b - 1j * a], [b - 1j * a, w + 1j * c]]) / math.hypot(*mobius.rotation)
+    return turn @ np.array([[1 - z, -x + 1j * y], [-x - 1j * y, 1 + z]], np.complex128)
+
+
+def _of_matrix(a: Complexes, reflected: bool) -> SphereMobius:
+    """Return what a matrix, (2, 2), stands for: its polar decomposition into a rotation and I - h.sigma."""
+    square = np.conj(a.T) @ a  # (1 + |h|^2) I - 2 h.sigma, up to scale
+    half = float(square[0, 0].real + square[1, 1].real)
+    x, y, z = 2 * float(square[0, 1].real), -2 * float(square[0, 1].imag), float((square[0, 0] - square[1, 1]).real)
+    under = half + math.sqrt(max(half * half - x * x - y * y - z * z, 0.0))
+    most = 1 - 2.0**-50  # which rounding may exceed
+    under = max(under, math.hypot(x, y, z) / most)
+    h = (-x / under, -y / under, -z / under)
+    back = np.array([[1 + h[2], h[0] - 1j * h[1]], [h[0] + 1j * h[1], 1 - h[2]]])  # the inverse, up to scale
+    turn = a @ back
+    root = np.sqrt(turn[0, 0] * turn[1, 1] - turn[0, 1] * turn[1, 0])
+    turn = turn / root
+    q = (float(turn[0, 0].real), -float(turn[0, 1].imag), float(turn[1, 0].real), -float(turn[0, 0].imag))
+    return SphereMobius(h, q, reflected)
+
+
 def hyperbolic_distance(x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
     """Return the pseudo-hyperbolic distance |x - y| / |1 - conj(y) x| in [0, 1], which every `Mobius` preserves.
 
@@ -145,25 +269,80 @@ def conformal_barycentre(points: Complexes, weights: Floats, tolerance: float = 
         The mean is taken as 0 below this.
     """
     weights = weights / weights.sum()
-    centring = Mobius()
-    moved = points
-    mean = complex(np.sum(weights * moved))
-    for _ in range(200):
-        if abs(mean) < tolerance:
-            break
+
+    def mean_of(moved: Complexes) -> complex:
+        return complex(np.sum(weights * moved))
+
+    def step_of(moved: Complexes, mean: complex) -> complex:
         # Newton's step for the mean of (x - z)/(1 - x conj(z)) at z = 0: 0 = mean - z + conj(z) square
         square = complex(np.sum(weights * moved**2))
-        step = (mean + square * mean.conjugate()) / max(1 - abs(square) ** 2, 1e-12)
-        length = abs(step)
-        step *= min(1.0, 0.7 / length)
+        return (mean + square * mean.conjugate()) / max(1 - abs(square) ** 2, 1e-12)
+
+    return _centring(Mobius(), points, mean_of, step_of, lambda step: Mobius(step, 0.0), abs, tolerance).z
+
+
+def spherical_barycentre(points: Floats, weights: Floats, tolerance: float = 1e-12) -> SphereMobius:
+    """Return a transformation for which the weighted mean of the points' images is 0: see `conformal_barycentre`.
+
+    Its h is the only one; with its rotation what is left of the points' pose is what they had before.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        On the unit sphere.
+    weights : (n,) float64
+        Non-negative, with a positive sum, less than half of it in one point.
+    tolerance : float
+        The mean is taken as 0 below this.
+    """
+    weights = weights / weights.sum()
+
+    def mean_of(moved: Floats) -> Floats:
+        return weights @ moved
+
+    def step_of(moved: Floats, mean: Floats) -> Floats:
+        # T_h(x) is x - 2 (h - x (x.h)) to first order
+        square = np.eye(3) - (weights[:, None] * moved).T @ moved
+        return 0.5 * np.linalg.solve(square + 1e-12 * np.eye(3), mean)
+
+    def moved_by(step: Floats) -> SphereMobius:
+        x, y, z = step.tolist()
+        return SphereMobius((x, y, z))
+
+    def length(x: Floats) -> float:
+        return float(np.sqrt((x**2).sum()))
+
+    return _centring(SphereMobius(), points, mean_of, step_of, moved_by, length, tolerance)
+
+
+def _centring(
+    centring: Any,
+    points: Any,
+    mean_of: Callable[[Any], Any],
+    step_of: Callable[[Any, Any], Any],
+    moved_by: Callable[[Any], Any],
+    length: Callable[[Any], float],
+    tolerance: float,
+) -> Any:
+    """Return the transformation after which the mean of points is 0, by Newton's method, in the disc or on the sphere.
+
+    `centring` is the identity; `mean_of` images; `step_of` images and their mean, Newton's step; `moved_by` a step, the
+    transformation that it is; `length` of a mean or step.
+    """
+    moved, mean = points, mean_of(points)
+    for _ in range(200):
+        if length(mean) < tolerance:
+            break
+        step = step_of(moved, mean)
+        step = step * min(1.0, 0.7 / length(step))
         while True:  # shorten until the mean falls, so that points near the circle cannot throw it about
-            trial = Mobius(step, 0.0) @ centring
+            trial = moved_by(step) @ centring
             moved_trial = trial(points)
-            mean_trial = complex(np.sum(weights * moved_trial))
-            if abs(mean_trial) < abs(mean) or abs(step) < 1e-15:
+            mean_trial = mean_of(moved_trial)
+            if length(mean_trial) < length(mean) or length(step) < 1e-15:
                 break
-            step *= 0.5
-        if abs(step) < 1e-15:
+            step = step * 0.5
+        if length(step) < 1e-15:
             break
         centring, moved, mean = trial, moved_trial, mean_trial
-    return centring.z
+    return centring

@@ -1,4 +1,4 @@
-"""How far a map of a mesh to the plane is from conformal."""
+"""How far a map of a mesh to the plane, or to the sphere, is from conformal."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..surface.laplacian import cotangents
-from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
+from ..surface.mesh import Complexes, Floats, Integers, Places, TriangleMesh
 
 
 @dataclass(frozen=True)
 class Distortion:
-    """Distortion of a map from a mesh to the plane.
+    """Distortion of a map from a mesh to the plane, or to the unit sphere with flat triangles between the vertices.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Distortion:
     flips : int
         Triangles turned over or collapsed in the plane.
     circularity : float
-        4 pi area / perimeter^2 of the boundary's image: 1 for a circle, less for any other curve.
+        4 pi area / perimeter^2 of the boundary's image: 1 for a circle, less for any other curve; 1 on the sphere.
     """
 
     mean_angle_error: float
@@ -46,6 +46,15 @@ def signed_areas(plane: Complexes, faces: Integers) -> Floats:
     return _areas(plane, faces)
 
 
+def signed_volumes(sphere: Floats, faces: Integers) -> Floats:
+    """Return det(a, b, c) of each triangle's corners, (m,): positive is counter-clockwise seen from outside.
+
+    Six times the volume of the tetrahedron between the triangle and the centre; points are (n, 3).
+    """
+    a, b, c = (sphere[faces[:, k]] for k in range(3))
+    return (a * np.cross(b - a, c - a)).sum(axis=1)
+
+
 def corner_angles(corners: Floats) -> Floats:
     """Return the angle at each corner in radians, (m, 3), of triangles (m, 3, d); pi/3 where a triangle is a point."""
     left = np.roll(corners, -1, axis=1) - corners
@@ -55,9 +64,9 @@ def corner_angles(corners: Floats) -> Floats:
     return np.where((dot == 0) & (cross == 0), np.pi / 3, np.arctan2(cross, dot))
 
 
-def angle_errors(mesh: TriangleMesh, plane: Complexes) -> Floats:
-    """Return |angle in the plane - angle on the surface| at each corner, (m, 3), in degrees."""
-    flat = np.stack([plane.real, plane.imag], axis=1)
+def angle_errors(mesh: TriangleMesh, image: Places) -> Floats:
+    """Return |angle in the image - angle on the surface| at each corner, (m, 3), in degrees."""
+    flat = np.stack([image.real, image.imag], axis=1) if image.ndim == 1 else image
     return np.degrees(np.abs(corner_angles(flat[mesh.faces]) - corner_angles(mesh.vertices[mesh.faces])))
 
 
@@ -125,15 +134,25 @@ def distortion(mesh: TriangleMesh, plane: Complexes, boundary: Integers) -> Dist
     boundary : (k,) int
         Vertices of the outer boundary in order.
     """
-    error = angle_errors(mesh, plane)
-    dilatation = dilatations(mesh, plane)
-    counted = np.isfinite(dilatation)
-    weight = mesh.face_areas[counted]
-    factor = log_conformal_factor(mesh, plane)
-    covered = np.abs(signed_areas(plane, mesh.faces)).sum()
-    factor = factor[np.isfinite(factor)] - 0.5 * np.log(max(covered, np.finfo(float).tiny) / mesh.area)
     rim = plane[boundary]
     perimeter = np.abs(np.roll(rim, -1) - rim).sum()
+    circularity = float(2 * np.pi * np.imag(np.conj(rim) * np.roll(rim, -1)).sum() / perimeter**2)
+    return _distortion(mesh, plane, int((signed_areas(plane, mesh.faces) <= 0).sum()), circularity)
+
+
+def spherical_distortion(mesh: TriangleMesh, sphere: Floats) -> Distortion:
+    """Return the distortion of a map of `mesh` to the unit sphere, (n, 3)."""
+    return _distortion(mesh, sphere, int((signed_volumes(sphere, mesh.faces) <= 0).sum()), 1.0)
+
+
+def _distortion(mesh: TriangleMesh, image: Complexes | Floats, flips: int, circularity: float) -> Distortion:
+    error = angle_errors(mesh, image)
+    dilatation = dilatations(mesh, image)
+    counted = np.isfinite(dilatation)
+    weight = mesh.face_areas[counted]
+    factor = log_conformal_factor(mesh, image)
+    covered = np.abs(_areas(image, mesh.faces)).sum()
+    factor = factor[np.isfinite(factor)] - 0.5 * np.log(max(covered, np.finfo(float).tiny) / mesh.area)
     median, percentile_99 = np.percentile(error, [50, 99])
     return Distortion(
         mean_angle_error=float(error.mean()),
@@ -144,6 +163,6 @@ def distortion(mesh: TriangleMesh, plane: Complexes, boundary: Integers) -> Dist
         max_dilatation=float(dilatation[counted].max(initial=1.0)),
         min_log_factor=float(factor.min()),
         max_log_factor=float(factor.max()),
-        flips=int((signed_areas(plane, mesh.faces) <= 0).sum()),
-        circularity=float(2 * np.pi * np.imag(np.conj(rim) * np.roll(rim, -1)).sum() / perimeter**2),
+        flips=flips,
+        circularity=circularity,
     )

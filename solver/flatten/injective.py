@@ -71,15 +71,23 @@ def require_injective(mesh: TriangleMesh, disc: Complexes) -> None:
         what = f"{plural(count, 'triangle')} would be turned over or lost"
     else:
         what = "parts of it would leave the disc"
-    image = np.abs(signed_areas(np.nan_to_num(disc), mesh.faces))
-    around = np.bincount(mesh.faces.ravel(), np.repeat(image / 3, 3), len(mesh.vertices))
-    seen = (around > 0) & (mesh.vertex_areas > 0)
-    share = mesh.vertex_areas[seen] / mesh.area / (around[seen] / np.pi)
-    power = int(np.log10(share.max())) if seen.any() else 0
+    power = shrinkage(mesh, np.abs(signed_areas(np.nan_to_num(disc), mesh.faces)) / np.pi)
     raise MeshError(
         f"'{mesh.name}' is too deep or too long for a disc: {what}, as parts shrink to 1/10^{power} of their area "
         "there: cut them off, or cut it into pieces that are about as wide as long"
     )
+
+
+def shrinkage(mesh: TriangleMesh, image: Floats) -> int:
+    """Return the p for which some vertex' surroundings shrink to 1/10^p of their share of the area, at most.
+
+    image : (m,) float64
+        The triangles' shares of the area that the surface is mapped to.
+    """
+    around = np.bincount(mesh.faces.ravel(), np.repeat(image / 3, 3), len(mesh.vertices))
+    seen = (around > 0) & (mesh.vertex_areas > 0)
+    share = mesh.vertex_areas[seen] / mesh.area / around[seen]
+    return int(np.log10(share.max())) if seen.any() else 0
 
 
 def collapsed(disc: Complexes, faces: Integers) -> Booleans:

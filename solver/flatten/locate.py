@@ -1,4 +1,4 @@
-"""Point location in a triangulated disc: the triangle that holds each point, and its barycentric coordinates there."""
+"""Point location in a triangulated disc or sphere: the triangle that holds a point, and where in it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..surface.mesh import Complexes, Floats, Integers, face_neighbours
+from ..surface.mesh import Complexes, Floats, Integers, Places, face_neighbours
 
 AT_ONCE = 4096
 """Queries outside whose nearest face is looked for at a time: some 100 MB of candidates."""
@@ -27,26 +27,26 @@ class TriangulatedDisc:
         The face across the side opposite each corner; -1 on the boundary.
     """
 
-    points: Complexes
+    points: Places
     faces: Integers
     neighbours: Integers
     _tree: KDTree
     _face_of_leaf: Integers
 
     @staticmethod
-    def of(points: Complexes, faces: Integers) -> TriangulatedDisc:
+    def of(points: Places, faces: Integers) -> TriangulatedDisc:
         """Prepare the triangulation with these points, (n,), and faces, (m, 3)."""
         used, first = np.unique(faces.ravel(), return_index=True)
         tree = KDTree(plane(points[used]))
         return TriangulatedDisc(points, faces, face_neighbours(faces, len(points)), tree, first // 3)
 
-    def locate(self, queries: Complexes) -> tuple[Integers, Floats]:
+    def locate(self, queries: Places) -> tuple[Integers, Floats]:
         """Return the face, (q,), that holds each query and the barycentric coordinates, (q, 3), in it.
 
         A query outside the triangulation (between the circle and the polygon inscribed in it) gets the nearest point of
         the boundary side it lies beyond.
         """
-        face = self._face_of_leaf[self._tree.query(plane(queries))[1]]
+        face = self._face_of_leaf[self._tree.query(self._coordinates(queries))[1]]
         inside = np.zeros(len(queries), bool)
         open_queries = np.arange(len(queries))
         previous = np.full(len(queries), -1)
@@ -70,19 +70,23 @@ class TriangulatedDisc:
             face[strays] = self._nearest_face(queries[strays])
         return face, self._clamped(face, queries)
 
-    def barycentric(self, face: Integers, queries: Complexes) -> Floats:
+    def barycentric(self, face: Integers, queries: Places) -> Floats:
         """Return barycentric coordinates, (q, 3), of queries in given faces; negative outside; thirds without area."""
         sides = self._side_areas(face, queries)
         total = sides.sum(axis=1, keepdims=True)
         return np.divide(sides, total, out=np.full_like(sides, 1 / 3), where=np.abs(total) > 0)
 
-    def _side_areas(self, face: Integers, queries: Complexes) -> Floats:
+    def _coordinates(self, points: Places) -> Floats:
+        """Return what the tree of the vertices holds."""
+        return plane(points)
+
+    def _side_areas(self, face: Integers, queries: Places) -> Floats:
         # in rows of their own: numpy multiplies strided complex numbers in one of two ways, by what lies beside them in
         # memory, and these differ in the last bit
         a, b, c = np.ascontiguousarray(self.points[self.faces[face]].T) - queries
         return np.stack([np.imag(np.conj(b) * c), np.imag(np.conj(c) * a), np.imag(np.conj(a) * b)], axis=1)
 
-    def _nearest_face(self, queries: Complexes, candidates: int = 24) -> Integers:
+    def _nearest_face(self, queries: Places, candidates: int = 24) -> Integers:
         """Return the face nearest to each query among those around the nearest vertices."""
         k = min(candidates, self._tree.n)
         result = np.empty(len(queries), np.intp)
@@ -99,7 +103,7 @@ class TriangulatedDisc:
             result[first : first + len(some)] = tried[np.arange(len(some)), nearest]
         return result
 
-    def _clamped(self, face: Integers, queries: Complexes) -> Floats:
+    def _clamped(self, face: Integers, queries: Places) -> Floats:
         """Return the barycentric coordinates of the point of each face nearest to its query."""
         weights = self.barycentric(face, queries)
         outside = np.flatnonzero((weights < 0).any(axis=1))
@@ -120,6 +124,47 @@ class TriangulatedDisc:
                 nearest[better] = row[better]
             weights[outside] = nearest
         return weights
+
+
+class TriangulatedSphere(TriangulatedDisc):
+    """The same for a triangulation of the sphere by geodesics; points and queries are (n, 3), of the unit sphere.
+
+    Barycentric coordinates are those of the point of the flat triangle under the query, seen from the centre.
+    """
+
+    @staticmethod
+    def of(points: Places, faces: Integers) -> TriangulatedSphere:
+        """Prepare the triangulation with these points, (n, 3), and faces, (m, 3), counter-clockwise from outside."""
+        used, first = np.unique(faces.ravel(), return_index=True)
+        return TriangulatedSphere(points, faces, face_neighbours(faces, len(points)), KDTree(points[used]), first // 3)
+
+    def _coordinates(self, points: Places) -> Floats:
+        return points
+
+    def _side_areas(self, face: Integers, queries: Places) -> Floats:
+        a, b, c = (self.points[self.faces[face, k]] for k in range(3))
+        # the volumes over the sides, from differences, which keep their digits next to a corner
+        pairs = ((b, c), (c, a), (a, b))
+        return np.stack([(queries * np.cross(x - queries, y - queries)).sum(axis=1) for x, y in pairs], axis=1)
+
+    def _nearest_face(self, queries: Places, candidates: int = 24) -> Integers:
+        """Return that face around the nearest vertices which a query lies least outside of."""
+        k = min(candidates, self._tree.n)
+        near = np.asarray(self._tree.query(queries, k=k)[1]).reshape(len(queries), k)
+        start = self._face_of_leaf[near]
+        best, least = start[:, 0].copy(), np.full(len(queries), -np.inf)
+        for column in np.concatenate([start, self.neighbours[start].reshape(len(queries), -1)], axis=1).T:
+            face = np.where(column < 0, start[:, 0], column)
+            # behind the sphere's centre a face is as far away as can be
+            before = (self.points[self.faces[face, 0]] * queries).sum(axis=1) > 0
+            inside = np.where(before, self.barycentric(face, queries).min(axis=1), -np.inf)
+            better = inside > least
+            best[better], least[better] = face[better], inside[better]
+        return best
+
+    def _clamped(self, face: Integers, queries: Places) -> Floats:
+        weights = np.maximum(self.barycentric(face, queries), 0)
+        return weights / weights.sum(axis=1, keepdims=True)
 
 
 def plane(points: Complexes) -> Floats:

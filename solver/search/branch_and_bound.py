@@ -14,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,9 @@ import numpy.typing as npt
 from ..mobius import Mobius
 from ..stages import SearchProgress
 from ..surface.mesh import Complexes, Floats, Integers
-from .kernels import CompiledKernels, ReferenceKernels, kernels_for
+from .kernels import kernels_for
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
-from .matching import Matching, matching
+from .matching import matching
 from .outcome import SearchResult
 from .watch import look, watched
 
@@ -145,23 +146,26 @@ def search(
         state.begin(matching(source, target, radius, metric=metric, weights=weights, check=state.check), reflect)
         state.run(np.inf if time_limit is None else started + time_limit, threads or os.cpu_count() or 1)
 
-    state = _Search(float(z_max), float(np.size(source)), until)
+    state = Search(float(z_max), float(np.size(source)), until)
     deadline = None if time_limit is None else started + time_limit
     tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
     cancelled = watched(work, state.halt, deadline, tell)
     return state.result(time.perf_counter() - started, cancelled)
 
 
-class _Search:
+class Search:
     """The state of one search: the best transformation so far, and the cells that may hold a better one."""
+
+    identity: Any = Mobius()
 
     def __init__(self, z_max: float, limit: float, until: Callable[[float, float, int], bool]) -> None:
         self.z_max, self.until = z_max, until
         self.halt = np.zeros(1, np.int32)
-        self.sides: list[Matching] = []
-        self.kernels: list[CompiledKernels | ReferenceKernels] = []
+        self.sides: list[Any] = []  # of `Matching`
+        self.kernels: list[Any] = []
         self.frontier: list[Floats] = []
-        self.best, self.best_side = Mobius(), 0
+        self.best: Any = self.identity
+        self.best_side = 0
         self.value = 0.0
         self.matches: Integers = np.zeros((0, 2), np.intp)
         self.unlooked = limit  # what is not known to be impossible before there is a frontier
@@ -199,10 +203,14 @@ class _Search:
             cancelled=cancelled,
             out_of_time=self.out_of_time or not (self.ended or cancelled),
             kernels=self.kernels[0].name if self.kernels else "",
-            counted=(self.sides[self.best_side], Mobius(best.z, best.theta)) if self.sides else None,
+            counted=(self.sides[self.best_side], self._plain(best)) if self.sides else None,
         )
 
-    def begin(self, plain: Matching, reflect: bool) -> None:
+    def _plain(self, best: Any) -> Any:
+        """Return a transformation without its reflection."""
+        return Mobius(best.z, best.theta)
+
+    def begin(self, plain: Any, reflect: bool) -> None:
         """Set up what the search needs."""
         self.sides = [plain, plain.reflected()] if reflect else [plain]
         self.unlooked = plain.limit
@@ -299,7 +307,7 @@ class _Search:
                 step /= 2
         self._offer(side, Mobius(z, theta))
 
-    def _offer(self, side: int, found: Mobius) -> None:
+    def _offer(self, side: int, found: Any) -> None:
         """Take a transformation if it is better, and within the bound on |z| to its last digit."""
         value, matches = self.sides[side].evaluated(found, self.check)
         if value > self.value and within(found.z, self.z_max):

@@ -12,14 +12,15 @@ is on the same side of it exactly. Of the others, next to the rim of their disc,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..mobius import Mobius, hyperbolic_disc, one_less_square
-from ..surface.mesh import Complexes, Floats, Integers
+from ..mobius import hyperbolic_disc, one_less_square
+from ..surface.mesh import Complexes, Floats, Integers, Places
 from .pairs import MOST_PAIRS, PAIRS_AT_ONCE, Rows, nothing, rows_of, too_many
 from .rim import surely_within
 
@@ -134,7 +135,7 @@ class Matching:
 
     def reflected(self) -> Matching:
         """Return the matching of the conjugated source."""
-        return Matching(np.conj(self.source), self.centres, self.radii, self.rows, self.unit, self.given)
+        return replace(self, source=self._conjugated())
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Cut the source points into ranges (first, last + 1) of `PAIRS_AT_ONCE` pairs or one point each."""
@@ -154,14 +155,27 @@ class Matching:
             some = slice(rows.start[first], rows.start[last])
             units = None if rows.units is None else rows.units[some]
             rows = Rows(rows.start[first : last + 1] - rows.start[first], rows.target[some], units)
-        return Matching(self.source[first:last], self.centres, self.radii, rows, self.unit, self.given)
+        return replace(self, source=self.source[first:last], rows=rows)
 
-    def _hits(self, mobius: Mobius, check: Callable[[], None]) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
-        """Yield pairs whose disc the transformed source point lies in: their numbers, points, targets and distances."""
+    def _conjugated(self) -> Any:
+        """Return the source reflected."""
+        return np.conj(self.source)
+
+    @staticmethod
+    def _sizes(differences: Any) -> Floats:
+        """Return how long differences of points are."""
+        return np.abs(differences)
+
+    def _guard(self, mobius: Any) -> Floats:
+        """Return how near to the rim of a disc floats do not decide, for the image of each source point, (N1,)."""
         z = np.conj(mobius.z) if mobius.reflected else mobius.z
-        image, spared = mobius(self.source), MOST_EXACT
         # the floor keeps a cancelled difference from looking exact
-        guard = GUARD * (1 + 1 / np.maximum(np.abs(1 - np.conj(z) * self.source) - 2.0**-50, 2.0**-50))
+        return GUARD * (1 + 1 / np.maximum(np.abs(1 - np.conj(z) * self.source) - 2.0**-50, 2.0**-50))
+
+    def _hits(self, mobius: Any, check: Callable[[], None]) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
+        """Yield pairs whose disc the transformed source point lies in: their numbers, points, targets and distances."""
+        image, spared = mobius(self.source), MOST_EXACT
+        guard = self._guard(mobius)
         farthest = self.radii + guard.max()
         for first, last in self.blocks():
             check()
@@ -175,44 +189,44 @@ class Matching:
             yield pair[sure], point[sure], target[sure], distance[sure]
 
     def _apart(
-        self, first: int, last: int, image: Complexes, farthest: Floats
+        self, first: int, last: int, image: Any, farthest: Floats
     ) -> tuple[Integers, Integers, Integers, Floats]:
         """Return the pairs of source points first to last - 1 that are no farther apart, and their distances."""
         if self.rows is None:
-            table = np.abs(image[first:last, None] - self.centres)
+            table = self._sizes(image[first:last, None] - self.centres)
             point, target = np.nonzero(table <= farthest)
             return (point + first) * len(self.centres) + target, point + first, target, table[point, target]
         point = np.repeat(np.arange(first, last), np.diff(self.starts[first : last + 1]))
         target = self._targets(first, last)
-        distance = np.abs(image[point] - self.centres[target])
+        distance = self._sizes(image[point] - self.centres[target])
         pair = np.flatnonzero(distance <= farthest[target])
         return pair + self.starts[first], point[pair], target[pair], distance[pair]
 
-    def _surely(self, mobius: Mobius, point: Integers, target: Integers) -> npt.NDArray[np.bool_]:
+    def _surely(self, mobius: Any, point: Integers, target: Integers) -> npt.NDArray[np.bool_]:
         discs = self.given or Discs(self.centres, self.radii, False)
         return surely_within(
             mobius, self.source[point], discs.centre[target], discs.radius[target], hyperbolic=discs.hyperbolic
         )
 
-    def hits(self, mobius: Mobius) -> Integers:
+    def hits(self, mobius: Any) -> Integers:
         """Return the pairs, as indices into `point` and `target`, whose disc the transformed source point lies in."""
         return self.within(mobius)[0]
 
-    def within(self, mobius: Mobius) -> tuple[Integers, Integers, Integers]:
+    def within(self, mobius: Any) -> tuple[Integers, Integers, Integers]:
         """Return `hits`, and their source and target points, (h,) each."""
         parts = zip(*((pair, j, k) for pair, j, k, _ in self._hits(mobius, nothing)), strict=True)
         pair, j, k = (np.concatenate(x) for x in parts)
         return pair, j, k
 
-    def value(self, mobius: Mobius) -> float:
+    def value(self, mobius: Any) -> float:
         """Return Q for one transformation, straight from its definition, as far as it is certain."""
         return self.evaluated(mobius)[0]
 
-    def matches(self, mobius: Mobius) -> Integers:
+    def matches(self, mobius: Any) -> Integers:
         """Return one (source point, target point) row per matched source point: the heaviest pair, then the nearest."""
         return self.evaluated(mobius)[1]
 
-    def evaluated(self, mobius: Mobius, check: Callable[[], None] = nothing) -> tuple[float, Integers]:
+    def evaluated(self, mobius: Any, check: Callable[[], None] = nothing) -> tuple[float, Integers]:
         """Return `value` and `matches`; `check` is called every few milliseconds and may raise."""
         worth, chosen = 0.0, [np.zeros((0, 2), np.intp)]
         for pair, point, target, distance in self._hits(mobius, check):
@@ -293,9 +307,9 @@ def _disc_points(points: npt.ArrayLike, role: str) -> Complexes:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What is searched: points of both discs, the radii of the match discs and the weights of the pairs."""
+    """What is searched: points of both discs or spheres, the radii of the match discs and the weights of the pairs."""
 
-    source: Complexes
-    target: Complexes
+    source: Places
+    target: Places
     radius: Floats
     weights: Floats

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ Integers = npt.NDArray[np.intp]
 Booleans = npt.NDArray[np.bool_]
 
 Complexes = npt.NDArray[np.complex128]
+
+Places = npt.NDArray[Any]
+"""Points of a parameter domain: (n,) complex128 in the disc, (n, 3) float64 on the sphere."""
 
 
 class MeshError(ValueError):

@@ -61,10 +61,16 @@ class Topology:
         """Whether the mesh is a triangulated disc: nothing in `problems`."""
         return not self.problems()
 
-    def problems(self, *, fill_holes: bool = False) -> tuple[str, ...]:
+    @property
+    def is_sphere(self) -> bool:
+        """Whether the mesh is a triangulated sphere."""
+        return not self.problems(closed=True)
+
+    def problems(self, *, fill_holes: bool = False, closed: bool = False) -> tuple[str, ...]:
         """Return what keeps the mesh from being a disc, each as the rest of a sentence, with what to do about it.
 
-        With `fill_holes` the disc may have openings: one boundary loop is its rim, the others will be closed.
+        With `fill_holes` the disc may have openings: one boundary loop is its rim, the others will be closed. With
+        `closed`, what keeps it from being a sphere.
         """
         found: list[str] = []
         if n := len(self.degenerate_faces):
@@ -82,7 +88,10 @@ class Topology:
         if found:
             return tuple(found)
         loops = len(self.boundary_loops)
-        if loops == 0:
+        if closed:
+            if loops:
+                found.append(f"has {plural(loops, 'boundary loop')} where a closed surface is needed: fill them")
+        elif loops == 0:
             found.append("is closed (it has no boundary): delete some faces to open it into a disc")
         elif loops > 1 and not fill_holes:
             edges = [f"{len(loop):,}" for loop in self.boundary_loops]
@@ -179,6 +188,20 @@ def require_disc(mesh: TriangleMesh, *, fill_holes: bool = False) -> Topology:
     """
     found = topology(mesh)
     if problems := found.problems(fill_holes=fill_holes):
+        raise MeshError(f"'{mesh.name}' " + "; it ".join(problems))
+    return found
+
+
+def require_sphere(mesh: TriangleMesh) -> Topology:
+    """Return the topology of a mesh that must be a closed surface without handles.
+
+    Raises
+    ------
+    MeshError
+        It is none; the text names the mesh and everything that is in the way.
+    """
+    found = topology(mesh)
+    if problems := found.problems(closed=True):
         raise MeshError(f"'{mesh.name}' " + "; it ".join(problems))
     return found
 

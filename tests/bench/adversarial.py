@@ -2,13 +2,14 @@
 
 Run::
 
-    uv run python tests/bench/adversarial.py [--cells 1000000] [--instances 1000] [--processes 2]
+    uv run python tests/bench/adversarial.py [--cells 1000000] [--instances 1000] [--processes 2] [--sphere]
 
 A million cells, where everything is at the edge of what is allowed (tests/solver/attacks.py), go through every kind of
 bound there is: swept in numpy; pairs, raster, windows and searched subtrees of each compiled library that runs here. In
 each cell a transformation is known, and its value in exact arithmetic: no bound may be below it. Then searches of
 planted instances, with each library and in numpy: value and bound are held against the planted value and `certify`,
-some bounds against a proof by `certify`. It prints counts, and ends with 1 if there is a violation.
+some bounds against a proof by `certify`. It prints counts, and ends with 1 if there is a violation. With --sphere the
+same for the search on the sphere (tests/solver/sphere_attacks.py).
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "solver")]
 
-from attacks import cells_of, searched, tried, violations  # noqa: E402
+import attacks  # noqa: E402
+import sphere_attacks  # noqa: E402
+from attacks import tried, violations  # noqa: E402
 
 AT_ONCE, PROBLEMS = 200, 500
 """Cells of a problem, and problems between two lines that tell how far it is."""
@@ -37,18 +40,20 @@ def main() -> int:
     parser.add_argument("--instances", type=int, default=1_000)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--first", type=int, default=0, help="number of the first problem")
+    parser.add_argument("--sphere", action="store_true", help="the search on the sphere instead of the disc's")
     given = parser.parse_args()
+    module = sphere_attacks if given.sphere else attacks
     total: Counter[str] = Counter()
     begun, number = time.perf_counter(), given.first
     with ProcessPoolExecutor(given.processes) as pool:
-        attempt = partial(tried, attempt=partial(cells_of, count=AT_ONCE))
+        attempt = partial(tried, attempt=partial(module.cells_of, count=AT_ONCE))
         while total["cells"] < given.cells:
             for counts in pool.map(attempt, range(number, number + PROBLEMS), chunksize=10):
                 total.update(counts)
             number += PROBLEMS
             print(f"{total['cells']:9d} cells, {time.perf_counter() - begun:.0f} s", flush=True)
         some = range(given.first, given.first + given.instances)
-        for counts in pool.map(partial(tried, attempt=searched), some, chunksize=5):
+        for counts in pool.map(partial(tried, attempt=module.searched), some, chunksize=5):
             total.update(counts)
     for name, count in sorted(total.items()):
         print(f"{count:9d} {name}")

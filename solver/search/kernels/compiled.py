@@ -9,17 +9,18 @@ import logging
 import threading
 from functools import cache
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
-from ...surface.mesh import Complexes, Floats
+from ...surface.mesh import Floats, Integers, Places
 from ..bounds import reaches, tangents
 from ..matching import Matching
 from ..watch import Halt, look
 from .layout import one_row, own_rows, sector_grid, sectors
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 8
+INTERFACE = 11
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
@@ -82,22 +83,22 @@ def opened(path: Path) -> ctypes.CDLL:
     loaded = ctypes.CDLL(str(path))
     if loaded.mobius_interface() != INTERFACE:
         raise ImportError(f"mobius_kernels has interface {loaded.mobius_interface()}, not {INTERFACE}")
-    loaded.mobius_work_bytes.restype = _I64
-    loaded.mobius_work_bytes.argtypes = [_I64, _I64]
-    loaded.mobius_images.restype = None
+    for prefix, centres in (("mobius", 2), ("sphere", 1)):
+        declared: tuple[tuple[str, type | None, list[type]], ...] = (
+            ("work_bytes", _I64, [_I64, _I64]),
+            ("bounds", None, [_POINTER, _POINTER, _I64, ctypes.c_int32, _POINTER, _I64]),
+            ("raster_bytes", _I64, [_I64]),
+            ("raster", None, [_POINTER]),
+            ("own_raster", None, [_POINTER]),
+            ("rotations", None, [*[_POINTER] * (5 + centres), _I64, _F64, _POINTER, _I64]),
+            ("expand", _I64, [_POINTER, _POINTER, _I64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]),
+        )
+        for name, result, arguments in declared:
+            function = getattr(loaded, f"{prefix}_{name}")
+            function.restype, function.argtypes = result, arguments
+    loaded.mobius_images.restype = loaded.sphere_images_of.restype = None
     loaded.mobius_images.argtypes = [_I64, _POINTER, _POINTER, _F64, _F64, _F64, _F64, _F64, *[_POINTER] * 4]
-    loaded.mobius_bounds.restype = None
-    loaded.mobius_bounds.argtypes = [_POINTER, _POINTER, _I64, ctypes.c_int32, _POINTER, _I64]
-    loaded.mobius_raster_bytes.restype = _I64
-    loaded.mobius_raster_bytes.argtypes = [_I64]
-    loaded.mobius_raster.restype = None
-    loaded.mobius_raster.argtypes = [_POINTER]
-    loaded.mobius_own_raster.restype = None
-    loaded.mobius_own_raster.argtypes = [_POINTER]
-    loaded.mobius_rotations.restype = None
-    loaded.mobius_rotations.argtypes = [*[_POINTER] * 7, _I64, _F64, _POINTER, _I64]
-    loaded.mobius_expand.restype = _I64
-    loaded.mobius_expand.argtypes = [_POINTER, _POINTER, _I64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]
+    loaded.sphere_images_of.argtypes = [_I64, *[_POINTER] * 8]
     return loaded
 
 
@@ -108,6 +109,8 @@ class CompiledKernels:
     """
 
     name = "compiled"
+    prefix = "mobius"
+    structure: type[_Problem] = _Problem
 
     def __init__(
         self,
@@ -120,24 +123,17 @@ class CompiledKernels:
         if loaded is None:
             raise ImportError("mobius_kernels is not installed")
         self._library = loaded
+        call = self._function
         self.unit = problem.unit
         self.points = len(problem.source)
         self.halt = np.zeros(1, np.int32) if halt is None else halt
         # about one target point in two of its sectors
         rings = int(np.clip(2 ** np.round(0.5 * np.log2(max(problem.count // self.points, 1))), 8, MOST_RINGS))
-        inner, outer = reaches(problem.centres, problem.radii)
-        tangent, wide = tangents(problem.centres, problem.radii)
-        b, turn = np.abs(problem.centres), np.angle(problem.centres) / (2 * np.pi)
-        wide /= 2 * np.pi
-        widest = np.where(tangent < 0, 1, wide)
-        discs = np.stack([inner, outer, turn, widest, tangent, wide, b, problem.radii], axis=1)
+        discs, b = self._discs(problem)
+        inner, outer, turn, widest = discs[:, :4].T
         row = one_row(problem)
         shared = row is not None
-        arrays: dict[str, np.ndarray | None] = {
-            "mx": problem.source.real,
-            "my": problem.source.imag,
-            "halt": self.halt,
-        }
+        arrays: dict[str, np.ndarray | None] = {**self._source(problem), "halt": self.halt}
         if shared:
             row = row[np.argsort(sectors(b[row], turn[row], rings), kind="stable")]
             b, turn, inner, outer, widest = (x[row] for x in (b, turn, inner, outer, widest))
@@ -145,17 +141,19 @@ class CompiledKernels:
                 "start": np.zeros(self.points, np.int64),
                 "stop": np.full(self.points, len(row), np.int64),
                 "discs": discs[row],
+                **self._places(problem, row),
             }
             typical = float(np.median(widest)) if len(row) else 1.0
         else:
             disc, reach, units, typical = own_rows(problem, inner, outer, widest, self._check)
             starts = problem.starts
             arrays |= {"start": starts[:-1], "stop": starts[1:], "discs": discs, "disc": disc, "reach": reach}
+            arrays |= self._places(problem, np.arange(len(discs)))
             arrays |= {"weight": units}
         finest = 1
         levels = int(np.clip(np.ceil(np.log2(1 / (SHARPNESS * typical * ANGLES))) + 1, 1, MOST_LEVELS))
         if shared:
-            arrays["raster"] = np.empty(loaded.mobius_raster_bytes(levels) // 8, np.uint64)
+            arrays["raster"] = np.empty(call("raster_bytes")(levels) // 8, np.uint64)
             finest = ANGLES << levels - 1
             arrays |= sector_grid(b, turn, inner, outer, widest, rings)
         elif self.points * OWN_RASTER <= MOST_OWN:
@@ -166,7 +164,7 @@ class CompiledKernels:
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
         self.rasters = "shared" if shared else "own" if "own" in arrays else ""
         heaviest = arrays.get("weight")
-        self._problem = _Problem(
+        self._problem = self.structure(
             points=self.points,
             planes=max(3, self.points.bit_length()),
             levels=levels,
@@ -181,19 +179,45 @@ class CompiledKernels:
         )
         self._local = threading.local()
         if shared:
-            loaded.mobius_raster(ctypes.addressof(self._problem))
+            call("raster")(ctypes.addressof(self._problem))
         elif "own" in arrays:
-            loaded.mobius_own_raster(ctypes.addressof(self._problem))
+            call("own_raster")(ctypes.addressof(self._problem))
         self._check()
 
-    def reflected(self) -> CompiledKernels:
+    def _function(self, name: str) -> Any:
+        """Return a function of the library."""
+        return getattr(self._library, f"{self.prefix}_{name}")
+
+    def _source(self, problem: Any) -> dict[str, np.ndarray | None]:
+        """Return the coordinates of the source points, by their names in kernels.c."""
+        return {"mx": problem.source.real, "my": problem.source.imag}
+
+    def _discs(self, problem: Any) -> tuple[Floats, Floats]:
+        """Return what kernels.c wants to know of the match discs, (N2, 8), and the modulus of their centres, (N2,)."""
+        inner, outer = reaches(problem.centres, problem.radii)
+        tangent, wide = tangents(problem.centres, problem.radii)
+        b, turn = np.abs(problem.centres), np.angle(problem.centres) / (2 * np.pi)
+        wide /= 2 * np.pi
+        widest = np.where(tangent < 0, 1, wide)
+        return np.stack([inner, outer, turn, widest, tangent, wide, b, problem.radii], axis=1), b
+
+    def _places(self, problem: Any, row: Integers) -> dict[str, np.ndarray | None]:
+        """Return what else kernels.c wants to know of the discs, in the order of `row`."""
+        del problem, row
+        return {}
+
+    def _rows(self, count: int) -> Floats:
+        """Return empty nodes."""
+        return new_nodes(count)
+
+    def reflected(self) -> Self:
         """Return the kernels for the conjugated source: discs and rasters are the same ones."""
         other = copy.copy(self)
         my = self._arrays["my"]
         assert my is not None
         conjugated = -my
         other._arrays = self._arrays | {"my": conjugated}
-        other._problem = _Problem.from_buffer_copy(self._problem)
+        other._problem = self.structure.from_buffer_copy(self._problem)
         other._problem.my = conjugated.ctypes.data
         return other
 
@@ -204,8 +228,8 @@ class CompiledKernels:
     def _work(self) -> int:
         """Return the address of this thread's working memory."""
         if not hasattr(self._local, "memory"):
-            self._local.memory = np.empty(self._library.mobius_work_bytes(self.points, ARENA), np.uint8)
-            self._local.left = new_nodes(2 * STACK)
+            self._local.memory = np.empty(self._function("work_bytes")(self.points, ARENA), np.uint8)
+            self._local.left = self._rows(2 * STACK)
         return self._local.memory.ctypes.data
 
     def images(self, z: complex, half: float, kappa: complex) -> tuple[Floats, Floats, Floats, Floats]:
@@ -219,13 +243,17 @@ class CompiledKernels:
     def bounds(self, nodes: Floats, raster: bool = False) -> Floats:
         """Return `nodes` with their own bound and kappa filled in; `raster`: from the raster, where there is one."""
         nodes = np.array(nodes, dtype=np.float64, order="C")
-        self._library.mobius_bounds(
+        self._function("bounds")(
             ctypes.addressof(self._problem), nodes.ctypes.data, len(nodes), raster, self._work(), ARENA
         )
         nodes[:, BOUND] *= self.unit
         return nodes
 
-    def rotations(self, z: Complexes, value: float = -1.0, windows: Floats | None = None) -> tuple[Floats, Floats]:
+    def _centres(self, z: Any) -> tuple[np.ndarray, ...]:
+        """Return where rotations are asked for, as arrays for kernels.c."""
+        return np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
+
+    def rotations(self, z: Places, value: float = -1.0, windows: Floats | None = None) -> tuple[Floats, Floats]:
         """Return, for each z, (C,), what a good theta is worth at most, and that theta.
 
         Worth 0: not above `value`, or not above the z before it.
@@ -234,12 +262,11 @@ class CompiledKernels:
         """
         windows = np.tile([0.0, 1.0], (len(z), 1)) if windows is None else windows
         start, width = np.ascontiguousarray(windows[:, 0]), np.ascontiguousarray(windows[:, 1])
-        x, y = np.ascontiguousarray(z.real), np.ascontiguousarray(z.imag)
+        centres = self._centres(z)
         turns, bounds = np.zeros(len(z)), np.zeros(len(z))
-        self._library.mobius_rotations(
+        self._function("rotations")(
             ctypes.addressof(self._problem),
-            x.ctypes.data,
-            y.ctypes.data,
+            *(x.ctypes.data for x in centres),
             start.ctypes.data,
             width.ctypes.data,
             turns.ctypes.data,
@@ -262,7 +289,7 @@ class CompiledKernels:
         parts, spent = [], 0
         while len(given):
             work, room = self._work(), self._local.left
-            done = self._library.mobius_expand(
+            done = self._function("expand")(
                 ctypes.addressof(self._problem),
                 given.ctypes.data,
                 len(given),
@@ -280,6 +307,6 @@ class CompiledKernels:
             if self.halt[0]:
                 parts.append(given)
                 break
-        left = np.concatenate(parts) if parts else new_nodes(0)
+        left = np.concatenate(parts) if parts else self._rows(0)
         left[:, BOUND] *= self.unit
         return left, spent

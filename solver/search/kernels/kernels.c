@@ -13,7 +13,10 @@
 
    Angles are in turns (1 is the full circle). No operation may be contracted or reassociated: -ffp-contract=off, no
    -ffast-math; then the result is the same on every machine. Rounding: every computed quantity below is off by less
-   than SLACK / |1 - conj(m) c|, and moved outward by that (the analysis is in ../bounds.py). */
+   than SLACK / |1 - conj(m) c|, and moved outward by that (the analysis is in ../bounds.py).
+
+   Compiled once more with SPHERE, by sphere.c: then source and target lie on the sphere, and where this file says modulus it
+   is g = (1 - cos a) / 2, a the polar angle, and where it says disc, a cap; the mathematics is in ../sphere_bounds.py. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -24,7 +27,16 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 8
+#ifdef SPHERE
+#define NAME(function) sphere_##function
+#define CHILDREN 8 /* of a cell */
+#define NARROW 0.125 /* turns; windows that are not are looked at stretch by stretch */
+#else
+#define NAME(function) mobius_##function
+#define CHILDREN 4
+#endif
+
+#define INTERFACE 11
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -66,6 +78,9 @@ typedef struct { /* one cache line */
     double turn, widest;    /* arg b in turns; the widest half-angle it is seen under, rounded up */
     double tangent, wide;   /* sqrt(b^2 - e^2), and asin(e / b) in turns, rounded up; tangent < 0: see pair_half_width */
     double b, e;            /* |b| and e */
+    /* SPHERE: g of the nearest and farthest point of the cap; its azimuth; the widest half-angle, 1 if it holds a pole; g of
+       where it is that, -1 if it holds the upper pole and 2 if the lower; sin and cos of its polar angle, cos of its radius,
+       -2 if it holds both poles */
 } Pair;
 
 typedef struct {
@@ -87,6 +102,10 @@ typedef struct {
     int64_t rings;          /* of the grid, a power of 2 below LEAST_RINGS; each has twice as many sectors */
     double z_max, smallest;
     const volatile int32_t *halt; /* not 0: come back at once, the search is over */
+#ifdef SPHERE
+    const double *mz;       /* the third coordinate of the source; z_max bounds |h| */
+    const double *caps;     /* (N2, 5), in the order of `discs`: centre, cos and sin of the radius */
+#endif
 } Problem;
 
 typedef struct {
@@ -94,6 +113,10 @@ typedef struct {
     double kx, ky;          /* common rotation: theta = window angle - Im(kappa (z - c)) */
     double from, width;     /* window of rotations in turns; width 1: all */
     double bound;           /* no (z, theta) here is worth more */
+#ifdef SPHERE
+    double hx, hy, hz, ball; /* x, y, half: the cell of axes, on a face of the cube; this one that of h */
+    double face;
+#endif
 } Node;
 
 typedef struct { uint32_t point, pair; } Entry;
@@ -145,6 +168,7 @@ static inline double argument(double y, double x) {
     return y < 0 ? -angle : angle;
 }
 
+#ifndef SPHERE
 /* ../bounds.py: slopes. D = 1 / (m - c) + conj(m) / (1 - conj(m) c), minus the derivative of log of the image. */
 static void slopes(int64_t n, const double *restrict mx, const double *restrict my, double cx, double cy,
                    double *restrict dx, double *restrict dy) {
@@ -218,6 +242,102 @@ static void images(int64_t n, const double *restrict mx, const double *restrict 
     }
 }
 
+static double reach_of(const Node *node) { return node->half; }
+#endif
+
+#ifdef SPHERE
+/* ../sphere_bounds.py: FACES. The rotation that takes the middle of each face of the cube to the upper pole. */
+static const double FACES[6][9] = {{1, 0, 0, 0, 1, 0, 0, 0, 1},  {1, 0, 0, 0, -1, 0, 0, 0, -1}, {0, 0, -1, 0, 1, 0, 1, 0, 0},
+                                   {0, 0, 1, 0, 1, 0, -1, 0, 0}, {1, 0, 0, 0, 0, -1, 0, 1, 0},  {1, 0, 0, 0, 0, 1, 0, -1, 0}};
+
+/* ../sphere_bounds.py: axis_radius. No axis of the cell is farther from its middle than this, in radians. */
+static double axis_radius(double x, double y, double half) {
+    if (!(half > 0)) return 0;
+    double sum = positive(x) + positive(y);
+    double across = half * __builtin_sqrt(2 + sum * sum), along = 1 + x * x + y * y - half * sum;
+    return argument(across, along) * TURN * (1 + 0x1p-40) + 0x1p-50;
+}
+
+/* ../sphere_bounds.py: shift. How far points move at most, beside what axes move, where |m - h| = 1. */
+static double reach_of(const Node *node) {
+    double r = node->ball * 0x1.bb67ae8584cabp+0; /* sqrt(3) rounded up */
+    return axis_radius(node->x, node->y, node->half) + 2 * r;
+}
+
+/* ../sphere_bounds.py: frames. */
+static void frame_of(const Node *node, double frame[9]) {
+    double length = 1 / __builtin_sqrt(1 + node->x * node->x + node->y * node->y);
+    double cx = node->x * length, cy = node->y * length, cz = length, over = 1 / (1 + cz);
+    double to_axis[9] = {1 - cx * cx * over, -cx * cy * over, -cx, -cx * cy * over, 1 - cy * cy * over, -cy, cx, cy, cz};
+    const double *turn = FACES[(int)node->face];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            frame[3 * i + k] = to_axis[3 * i] * turn[k] + to_axis[3 * i + 1] * turn[3 + k] + to_axis[3 * i + 2] * turn[6 + k];
+}
+
+/* ../sphere_bounds.py: images. Azimuth alpha +- delta in turns (delta >= 1/2: any), g in [near, far]. */
+static void sphere_images(int64_t n, const double *restrict mx, const double *restrict my, const double *restrict mz,
+                          const Node *node, double *restrict alpha, double *restrict delta, double *restrict near,
+                          double *restrict far) {
+    double hx = node->hx, hy = node->hy, hz = node->hz, r = node->ball * 0x1.bb67ae8584cabp+0;
+    double h2 = hx * hx + hy * hy + hz * hz, inside = 1 - h2;
+    double tilt = axis_radius(node->x, node->y, node->half);
+    double frame[9];
+    frame_of(node, frame);
+    int outside = !(__builtin_sqrt(h2) + r < 1 - 0x1p-5); /* of what the formulas hold for */
+    for (int64_t j = 0; j < n; j++) {
+        double wx = mx[j] - hx, wy = my[j] - hy, wz = mz[j] - hz, w2 = wx * wx + wy * wy + wz * wz;
+        double away = __builtin_sqrt(w2), scale = inside / w2;
+        double ux = wx * scale - hx, uy = wy * scale - hy, uz = wz * scale - hz;
+        double vx = frame[0] * ux + frame[1] * uy + frame[2] * uz, vy = frame[3] * ux + frame[4] * uy + frame[5] * uz;
+        double vz = frame[6] * ux + frame[7] * uy + frame[8] * uz;
+        double sine = __builtin_sqrt(vx * vx + vy * vy);
+        double d = r > 0 ? 2 * r / most(away - r, 0x1p-10) * (1 + 0x1p-40) : 0, all = d + tilt;
+        int any = outside | !(all < 1.5);
+        d = any ? 0 : d; all = any ? 0 : all;
+        double q = all * all, rest = q * q * q * q * q / 3000000;
+        double c = 1 - q * (0.5 - q * (1.0 / 24 - q * (1.0 / 720 - q * (1.0 / 40320))));
+        double s = all * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040 - q * (1.0 / 362880)))));
+        double low = vz * c + sine * s, high = vz * c - sine * s; /* cosines of the polar angle less and plus all */
+        double low_sine = sine * c - vz * s - rest - SLACK, high_sine = sine * c + vz * s - rest - SLACK;
+        int top = !(low_sine > 0), bottom = !(high_sine > 0); /* a pole is in reach */
+        near[j] = (any | top) ? 0 : most(0.5 * (1 - low - rest) - SLACK, 0);
+        far[j] = (any | bottom) ? 1 : least(0.5 * (1 - high + rest) + SLACK, 1);
+        double e = d * d, sd = d * (1 - e * (1.0 / 6 - e * (1.0 / 120))) + SLACK;
+        double plain = (s + rest + SLACK) / sine;
+        double steep = most((positive(low) + rest + SLACK) / low_sine, (positive(high) + rest + SLACK) / high_sine);
+        double sure = (top | bottom) ? 1 : 1 / sine;
+        double slanted = arcsine(least(sd * sure, 1)) + ((top | bottom) ? 1 : tilt * steep * (1 + 0x1p-40) * PER_RADIAN);
+        double angle = least(plain < 1 ? arcsine(plain) : 1, slanted) + 4 * SLACK * sure;
+        alpha[j] = argument(vy, vx);
+        delta[j] = (any | top | bottom | !(angle < 0.5)) ? 1 : angle;
+    }
+}
+#endif
+
+/* Twice the angle whose sine's square is q, in turns, rounded up by less than the tolerance and some slack. */
+static inline double half_angle(double q, double tolerance) {
+    if (!(q < 1)) return 1;
+    if (!(q > 0)) return 0;
+    double s = __builtin_sqrt(q);
+    if (q * q * s < tolerance * TURN) return 2 * arcsine(s); /* off by less than s^5 / 2 */
+    return 2 * (argument(s, __builtin_sqrt(1 - q)) + SLACK * PER_RADIAN);
+}
+
+#ifdef SPHERE
+/* ../sphere_bounds.py: widest_half_angle, in turns. The widest circle is where a great circle touches the cap. */
+static inline double pair_half_width(const Pair *pair, double near, double far, double tolerance) {
+    double g = near;
+    if (pair->tangent >= 0) {
+        if (far < pair->tangent) g = far;
+        else if (near <= pair->tangent) return pair->widest;
+    }
+    double sine = 2 * __builtin_sqrt(g * (1 - g));
+    double above = (1 - 2 * g) * pair->b + sine * pair->wide - pair->e + 0x1p-48;
+    if (!(above > 0)) return 0;
+    return half_angle(above / (2 * sine * pair->wide) * (1 + 0x1p-46), tolerance);
+}
+#else
 /* ../bounds.py: widest_half_angle, in turns. The widest circle is that of the tangents' length, if it is in reach. */
 static inline double pair_half_width(const Pair *pair, double near, double far, double tolerance) {
     double rho = near, b = pair->b, e = pair->e, rest = 0x1p-48;
@@ -229,12 +349,9 @@ static inline double pair_half_width(const Pair *pair, double near, double far, 
         rest = 0x1p-44 * e;
     }
     double q = ((e - (b - rho)) * (e + (b - rho)) + rest) / (4 * rho * b) * (1 + 0x1p-48);
-    if (!(q < 1)) return 1;
-    if (!(q > 0)) return 0;
-    double s = __builtin_sqrt(q);
-    if (q * q * s < tolerance * TURN) return 2 * arcsine(s); /* off by less than s^5 / 2 */
-    return 2 * (argument(s, __builtin_sqrt(1 - q)) + SLACK * PER_RADIAN);
+    return half_angle(q, tolerance);
 }
+#endif
 
 static inline void paint(uint64_t *word, int low, int high) {
     int first = low >> 6, last = high >> 6;
@@ -274,7 +391,7 @@ static void counter_clear(Counter *c, int words, int planes) {
 }
 
 typedef struct {
-    double *mx, *my, *alpha, *delta, *near, *far, *dx, *dy; /* (N1,) each */
+    double *mx, *my, *alpha, *delta, *near, *far, *dx, *dy; /* (N1,) each; SPHERE: dx is the third coordinate */
     uint32_t *active;       /* (N1,) */
     Entry *arena;
     int64_t room;
@@ -356,14 +473,14 @@ static inline size_t row_of(int level, int span, int spread, int ring) {
     return (((size_t)span * (LAST_SPREAD - FIRST_SPREAD + 1) + spread - FIRST_SPREAD) * rings_of(level) + ring) * row_words(level);
 }
 
-EXPORT int64_t mobius_raster_bytes(int64_t levels) {
+EXPORT int64_t NAME(raster_bytes)(int64_t levels) {
     size_t words = 0;
     for (int i = 0; i < levels; i++) words += level_words(i);
     return (int64_t)(words * sizeof(uint64_t));
 }
 
 /* Draw the discs of the one row of pairs; only some of them if halted. */
-EXPORT void mobius_raster(const Problem *p) {
+EXPORT void NAME(raster)(const Problem *p) {
     for (int level = 0; level < p->levels; level++) {
         uint64_t *raster = (uint64_t *)level_of(p->raster, level);
         int angles = angles_of(level), rings = rings_of(level), words = angles / 64, length = row_words(level);
@@ -692,7 +809,7 @@ static void weigh_heavy(const uint32_t *total, const uint64_t *window, const Que
 }
 
 /* Draw each source point's own discs; only of some if halted. */
-EXPORT void mobius_own_raster(const Problem *p) {
+EXPORT void NAME(own_raster)(const Problem *p) {
     for (int64_t j = 0; j < p->points && !*p->halt; j++) {
         uint8_t *raster = p->own + j * OWN_RINGS * HEAVY_BINS;
         for (int i = 0; i < OWN_RINGS * HEAVY_BINS; i++) raster[i] = 0;
@@ -824,20 +941,101 @@ static void sum_pairs(const Problem *p, Work *w, const Query *q, int64_t n, doub
     weigh(&w->counter, window, q, from, width / BINS, width < 1 ? 0 : BINS, out);
 }
 
+#ifdef SPHERE
+/* cos and sin of an angle in turns, to 2^-50: series for at most an eighth of a turn. */
+static void direction(double turns, double *cosine, double *sine) {
+    double quarters = whole(4 * turns + 0.5), x = (turns - quarters * 0.25) * TURN, q = x * x;
+    double c = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90 * (1 - q / 132 * (1 - q / 182))))));
+    double s = x * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156 * (1 - q / 210)))))));
+    int turn = (int)((int64_t)quarters & 3);
+    *cosine = turn == 0 ? c : turn == 1 ? -s : turn == 2 ? -c : s;
+    *sine = turn == 0 ? s : turn == 1 ? c : turn == 2 ? -s : -c;
+}
+
+/* ../sphere_bounds.py: whole_cells. Whether Q exceeds `value` nowhere in a cell and a narrow window, by the pairs of a list
+   that can be matched anywhere in both; these are few, and no arc is laid. */
+static int surely_dead(const Problem *p, const Query *q, double from, double width) {
+    const Node *node = q->node;
+    double cosine, sine, frame[9], turned[9];
+    direction(from + width / 2, &cosine, &sine);
+    frame_of(node, frame);
+    for (int k = 0; k < 3; k++) {
+        turned[k] = cosine * frame[k] - sine * frame[3 + k];
+        turned[3 + k] = sine * frame[k] + cosine * frame[3 + k];
+        turned[6 + k] = frame[6 + k];
+    }
+    double hx = node->hx, hy = node->hy, hz = node->hz, h2 = hx * hx + hy * hy + hz * hz;
+    double r = node->ball * 0x1.bb67ae8584cabp+0, tilt = axis_radius(node->x, node->y, node->half);
+    double spin = width * (TURN / 2) * (1 + 0x1p-40);
+    if (!(__builtin_sqrt(h2) + r < 1 - 0x1p-5)) return 0;
+    int64_t total = 0, last = -1;
+    for (int64_t i = 0; i < q->entries; i++) /* lists are sorted by weight */
+        if (q->parents[i].point != last) { total += p->weight[q->parents[i].pair]; last = q->parents[i].point; }
+    for (int64_t i = 0; i < q->entries && (double)total > q->value;) {
+        uint32_t j = q->parents[i].point;
+        double wx = p->mx[j] - hx, wy = p->my[j] - hy, wz = p->mz[j] - hz, w2 = wx * wx + wy * wy + wz * wz;
+        double scale = (1 - h2) / w2, ux = wx * scale - hx, uy = wy * scale - hy, uz = wz * scale - hz;
+        double vx = turned[0] * ux + turned[1] * uy + turned[2] * uz, vy = turned[3] * ux + turned[4] * uy + turned[5] * uz;
+        double vz = turned[6] * ux + turned[7] * uy + turned[8] * uz;
+        double d = (r > 0 ? 2 * r / most(__builtin_sqrt(w2) - r, 0x1p-10) * (1 + 0x1p-40) : 0) + tilt;
+        d += spin * (__builtin_sqrt(vx * vx + vy * vy) + 0x1p-40);
+        uint32_t heaviest = p->weight[q->parents[i].pair], found = 0;
+        if (!(d < 1)) { while (i < q->entries && q->parents[i].point == j) i++; continue; }
+        double e = d * d, c = 1 - e * (0.5 - e * (1.0 / 24 - e / 720)); /* below cos d */
+        double s = d * (1 - e * (1.0 / 6 - e * (1.0 / 120 - e * (1.0 / 5040 - e / 362880)))); /* above sin d */
+        for (; i < q->entries && q->parents[i].point == j; i++) {
+            uint32_t pair = q->parents[i].pair;
+            const double *cap = p->caps + 5 * (p->disc ? p->disc[pair] : pair);
+            double dot = vx * cap[0] + vy * cap[1] + vz * cap[2];
+            if (cap[3] < -0.5 || dot + SLACK >= cap[3] * (cap[3] > 0 ? c : 1) - cap[4] * s) { found = p->weight[pair]; break; }
+        }
+        while (i < q->entries && q->parents[i].point == j) i++;
+        total -= heaviest - found;
+    }
+    return !((double)total > q->value);
+}
+
+/* Put the pairs of each source point in order of weight, the heaviest first. */
+static void by_weight(const Problem *p, Entry *list, int64_t n) {
+    for (int64_t i = 1; i < n; i++) {
+        Entry key = list[i];
+        int64_t k = i;
+        while (k > 0 && list[k - 1].point == key.point && p->weight[list[k - 1].pair] < p->weight[key.pair]) { list[k] = list[k - 1]; k--; }
+        list[k] = key;
+    }
+}
+#endif
+
 /* Bound Q over a cell and a window, which is moved and widened from the parent's kappa to ours. */
 static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
     const Node *node = q->node;
     int64_t n = 0;
     const double *mx = p->mx, *my = p->my;
+#ifdef SPHERE
+    if (q->parents && p->weight && node->width < NARROW && surely_dead(p, q, node->from, node->width)) {
+        out->kx = out->ky = 0;
+        out->bound = 0; out->entries = 0; out->painted = 0; out->clusters = 0;
+        return;
+    }
+#endif
     if (q->parents) {
         for (int64_t i = 0; i < q->entries; i++)
             if (n == 0 || w->active[n - 1] != q->parents[i].point) {
                 uint32_t j = q->parents[i].point;
-                w->mx[n] = p->mx[j]; w->my[n] = p->my[j]; w->active[n++] = j;
+                w->mx[n] = p->mx[j]; w->my[n] = p->my[j];
+#ifdef SPHERE
+                w->dx[n] = p->mz[j];
+#endif
+                w->active[n++] = j;
             }
         mx = w->mx; my = w->my;
     } else n = p->points;
 
+    double from = node->from, width = node->width;
+#ifdef SPHERE
+    sphere_images(n, mx, my, q->parents ? w->dx : p->mz, node, w->alpha, w->delta, w->near, w->far);
+    out->kx = out->ky = 0;
+#else
     double kx = node->kx, ky = node->ky;
     if (node->half > STEADY) {
         slopes(n, mx, my, node->x, node->y, w->dx, w->dy);
@@ -847,22 +1045,25 @@ static void evaluate(const Problem *p, Work *w, const Query *q, Outcome *out) {
     out->kx = kx; out->ky = ky;
     images(n, mx, my, node->x, node->y, node->half, kx, ky, w->alpha, w->delta, w->near, w->far);
 
-    double from = node->from, width = node->width;
     if (width < 1) {
         double shift = node->half * (positive(kx - node->kx) + positive(ky - node->ky)) * PER_RADIAN + 0x1p-40;
         from -= shift; width += 2 * shift;
         if (width > FULL) { from = 0; width = 1; }
     }
+#endif
     out->entries = 0; out->painted = 0; out->clusters = 0;
     if (q->raster && p->raster) sum_raster(p, w, q, n, from, width, out);
     else if (q->raster) sum_own_raster(p, w, q, n, from, width, out);
     else sum_pairs(p, w, q, n, from, width, out);
+#ifdef SPHERE
+    if (p->weight && q->children && !q->parents && out->entries > 0) by_weight(p, q->children, out->entries);
+#endif
 }
 
 static int64_t doubles_of(int64_t points) { return 8 * points; }
 
 /* Bytes of working memory that each thread must bring. */
-EXPORT int64_t mobius_work_bytes(int64_t points, int64_t arena) {
+EXPORT int64_t NAME(work_bytes)(int64_t points, int64_t arena) {
     return doubles_of(points) * 8 + points * 4 + 64 + arena * (int64_t)sizeof(Entry);
 }
 
@@ -877,6 +1078,7 @@ static Work work_in(void *memory, int64_t points, int64_t arena) {
     return w;
 }
 
+#ifndef SPHERE
 EXPORT int32_t mobius_interface(void) { return INTERFACE; }
 
 /* Whether this machine runs the library that is built for x86-64-v3: AVX2, FMA, BMI, and a system that saves ymm. */
@@ -899,15 +1101,23 @@ EXPORT int32_t mobius_runs_v3(void) {
     return 0;
 #endif
 }
+#endif
 
 /* For the tests: what `images` makes of one cell, with the common rotation given. */
+#ifdef SPHERE
+EXPORT void sphere_images_of(int64_t n, const double *mx, const double *my, const double *mz, const Node *node, double *alpha,
+                             double *delta, double *near, double *far) {
+    sphere_images(n, mx, my, mz, node, alpha, delta, near, far);
+}
+#else
 EXPORT void mobius_images(int64_t n, const double *mx, const double *my, double x, double y, double half, double kx,
                           double ky, double *alpha, double *delta, double *near, double *far) {
     images(n, mx, my, x, y, half, kx, ky, alpha, delta, near, far);
 }
+#endif
 
 /* The bound of each node (cell and window), written into it; the node's kappa becomes that of the bound. */
-EXPORT void mobius_bounds(const Problem *p, Node *nodes, int64_t n, int32_t raster, void *memory, int64_t arena) {
+EXPORT void NAME(bounds)(const Problem *p, Node *nodes, int64_t n, int32_t raster, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) {
         Outcome out;
@@ -921,7 +1131,11 @@ typedef struct { Node node; int64_t offset, entries, free; } Open; /* list of pa
 
 /* A rotation, in turns, that is good for each z, and what it is worth at most: by looking ever closer at the best stretches
    of its window. Worth 0: not above `value`, or not above the z before it, or not looked at before a halt. */
-EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y, const double *from,
+#ifdef SPHERE
+EXPORT void NAME(rotations)(const Problem *p, const Node *cells, const double *from,
+#else
+EXPORT void NAME(rotations)(const Problem *p, const double *x, const double *y, const double *from,
+#endif
                              const double *width, double *turns, double *bounds, int64_t n, double value, void *memory, int64_t arena) {
     Work w = work_in(memory, p->points, arena);
     for (int64_t i = 0; i < n; i++) turns[i] = bounds[i] = 0;
@@ -933,7 +1147,13 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
             Open open[LOOKS * CLUSTERS + 1];
             int64_t top = 0;
             int depth = 1, raster = p->raster || p->own;
+#ifdef SPHERE
+            open[0] = (Open){cells[i], 0, -1, 0};
+            open[0].node.half = open[0].node.ball = 0;
+            open[0].node.from = from[i]; open[0].node.width = width[i]; open[0].node.bound = 0x1p40;
+#else
             open[0] = (Open){{x[i], y[i], 0, 0, 0, from[i], width[i], 0x1p40}, 0, -1, 0};
+#endif
             for (int looks = 0; depth && looks < LOOKS; looks++) {
                 Open seen = open[--depth];
                 Node node = seen.node;
@@ -972,12 +1192,57 @@ EXPORT void mobius_rotations(const Problem *p, const double *x, const double *y,
     }
 }
 
+#ifdef SPHERE
+/* ../sphere_bounds.py: children. Whether child q is one that may hold a transformation; its window is moved and widened. */
+static int child_of(const Problem *p, const Node *node, int q, Node *child) {
+    *child = *node;
+    double tilt = axis_radius(node->x, node->y, node->half);
+    if (tilt < 2 * node->ball * 0x1.bb67ae8584cabp+0) {
+        double b = node->ball / 2, o2 = 0;
+        double *h[3] = {&child->hx, &child->hy, &child->hz};
+        for (int i = 0; i < 3; i++) {
+            *h[i] += q >> i & 1 ? b : -b;
+            double o = most(positive(*h[i]) - b, 0);
+            o2 += o * o;
+        }
+        child->ball = b;
+        return o2 <= p->z_max * p->z_max * (1 + 0x1p-50);
+    }
+    if (q >= 4) return 0;
+    double half = node->half / 2;
+    child->half = half;
+    child->x += q & 1 ? half : -half; child->y += q & 2 ? half : -half;
+    if (child->width < 1) {
+        double l0 = __builtin_sqrt(1 + node->x * node->x + node->y * node->y);
+        double l1 = __builtin_sqrt(1 + child->x * child->x + child->y * child->y);
+        double det = node->x * child->y - node->y * child->x, dot = 1 + node->x * child->x + node->y * child->y;
+        double small = axis_radius(child->x, child->y, half), most_of = tilt < 0.25 ? 0.51 : 1.05;
+        double wide = most_of * tilt * small * PER_RADIAN + 0x1p-40;
+        child->from -= 2 * argument(det, l0 * l1 + l0 + l1 + dot) + wide;
+        child->width += 2 * wide;
+        if (child->width > FULL) { child->from = 0; child->width = 1; }
+    }
+    return 1;
+}
+#else
+/* Whether child q of a cell is one that may hold a transformation; its window is moved. */
+static int child_of(const Problem *p, const Node *node, int q, Node *child) {
+    static const double side[4][2] = {{-1, -1}, {1, -1}, {-1, 1}, {1, 1}};
+    double half = node->half / 2, sx = side[q][0] * half, sy = side[q][1] * half;
+    *child = *node;
+    child->half = half; child->x += sx; child->y += sy;
+    double ox = most(positive(child->x) - half, 0), oy = most(positive(child->y) - half, 0);
+    if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) return 0;
+    if (child->width < 1) child->from -= (child->kx * sy + child->ky * sx) * PER_RADIAN;
+    return 1;
+}
+#endif
+
 /* Search the subtrees of `nodes` depth first for cells whose bound exceeds `value`, at most `budget` bounds each; what is
    left open goes to `left`. Returns how many of `nodes` were taken on (all, unless `left` might overflow, or halted).
    counts: nodes left, bounds computed, arcs laid, bounds that inherited a list of pairs. */
-EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, double value, int64_t budget, Node *left,
+EXPORT int64_t NAME(expand)(const Problem *p, const Node *nodes, int64_t n, double value, int64_t budget, Node *left,
                              int64_t left_room, int64_t *counts, void *memory, int64_t arena) {
-    static const double side[4][2] = {{-1, -1}, {1, -1}, {-1, 1}, {1, 1}};
     Work w = work_in(memory, p->points, arena);
     Open stack[STACK];
     int64_t bounds = 0, painted = 0, inherited = 0, done = 0, found = 0;
@@ -987,7 +1252,7 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
         while (depth) {
             Open open = stack[--depth];
             if (open.node.bound <= value) continue;
-            int64_t most_children = 4 * CLUSTERS * CLUSTERS; /* what follows may push that many */
+            int64_t most_children = CHILDREN * CLUSTERS * CLUSTERS; /* what follows may push that many */
             if (open.node.half <= p->smallest || spent >= budget || depth + most_children > STACK ||
                 found + depth + most_children >= left_room) {
                 left[found++] = open.node;
@@ -996,14 +1261,23 @@ EXPORT int64_t mobius_expand(const Problem *p, const Node *nodes, int64_t n, dou
             int64_t top = open.free;
             int64_t base = depth;
             int halted = *p->halt;
-            double half = open.node.half / 2;
-            for (int q = 0; q < 4 && !halted; q++) {
-                Node child = open.node;
-                double sx = side[q][0] * half, sy = side[q][1] * half;
-                child.half = half; child.x += sx; child.y += sy;
-                double ox = most(positive(child.x) - half, 0), oy = most(positive(child.y) - half, 0);
-                if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) continue;
-                if (child.width < 1) child.from -= (child.kx * sy + child.ky * sx) * PER_RADIAN;
+#ifdef SPHERE
+            if (p->weight && open.entries < 0 && open.node.width < NARROW) { /* one list for all children */
+                Outcome out;
+                Query query = {&open.node, value, 0, 0, 0, w.arena + top, w.room - top, HEAVY_BINS / 16, 0};
+                evaluate(p, &w, &query, &out);
+                if (!(halted = *p->halt)) {
+                    bounds++; spent++; painted += out.painted;
+                    if (!out.clusters) continue;
+                    open.node.bound = least(open.node.bound, out.bound);
+                    if (out.entries > 0) { open.offset = top; open.entries = out.entries; top += out.entries; }
+                }
+            }
+#endif
+            for (int q = 0; q < CHILDREN && !halted; q++) {
+                Node child;
+                if (!child_of(p, &open.node, q, &child)) continue;
+                double half = reach_of(&child);
                 const Entry *list = open.entries < 0 ? 0 : w.arena + open.offset;
                 int gap = (p->weight ? HEAVY_BINS : BINS) / 16, raster = (p->raster || p->own) && half >= p->coarse && !list;
                 Outcome coarse, out;

@@ -24,28 +24,28 @@ MOST_AT_ONCE = 1 << 19
 def bound_cells(problem: Matching, centre: Complexes, half: Floats, check: Callable[[], None] = nothing) -> Floats:
     """Return, for each square cell of z, (C,), a number that Q does not exceed at any z in it and any theta."""
     bounds = np.zeros(len(centre))
-    for some in _some(problem, len(centre)):
+    for some in cuts(problem, len(centre)):
         kappa = common_rotation(problem.source, centre[some], np.zeros(len(centre[some]), np.complex128))
         arcs = partial(enclosing_arcs, centre=centre[some], half=half[some], kappa=kappa)
-        bounds[some] = _stabbed(problem, arcs, len(kappa), check)[0]
+        bounds[some] = stabbed(problem, arcs, len(kappa), check)[0]
     return bounds
 
 
 def best_rotations(problem: Matching, z: Complexes, check: Callable[[], None] = nothing) -> tuple[Floats, Floats]:
     """Return U(z) = max over theta of Q, and such a theta in radians, for each z, (C,); to rounding error."""
     values, rotations = np.zeros(len(z)), np.zeros(len(z))
-    for some in _some(problem, len(z)):
-        values[some], rotations[some] = _stabbed(problem, partial(exact_arcs, z=z[some]), len(z[some]), check)
+    for some in cuts(problem, len(z)):
+        values[some], rotations[some] = stabbed(problem, partial(exact_arcs, z=z[some]), len(z[some]), check)
     return values, rotations
 
 
-def _some(problem: Matching, count: int) -> list[slice]:
+def cuts(problem: Matching, count: int) -> list[slice]:
     """Cut `count` cells into as many as are looked at in one go."""
     step = int(np.clip(MOST_AT_ONCE // max(problem.count, 1), 1, CELLS_AT_ONCE))
     return [slice(first, first + step) for first in range(0, count, step)]
 
 
-def _stabbed(
+def stabbed(
     problem: Matching, arcs: Callable[[Matching], Arcs], rows: int, check: Callable[[], None]
 ) -> tuple[Floats, Floats]:
     """Sweep over the arcs of all pairs, which are laid out some source points at a time."""
