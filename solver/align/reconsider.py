@@ -146,6 +146,12 @@ def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:
                 f"mirrored {100 * _sure(one[0]):.0f} %; taken as not mirrored"
             )
     found, what = best
+    if found.mobius.reflected and found.overlap is not None and found.other is not None:
+        # the other sides of two pieces of something symmetric fit each other as well as one side fits itself
+        said = (
+            "ambiguous orientation: what the surfaces have in common matches only mirrored; if they show something "
+            "symmetric, these are opposite sides of it"
+        )
     warnings = found.warnings
     if what:
         warnings = (f"reconsidered: the best map of the search fits less well than {what}, which is taken", *warnings)
