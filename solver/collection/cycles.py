@@ -21,7 +21,7 @@ SHARPER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 wrong at first, so that each counts, and in the end those that are wrong by more than a fraction of it hardly do."""
 
 MOST_TRIANGLES = 20_000
-"""Triangles that are walked, at most: two milliseconds each."""
+"""Triangles that are walked, at most: their number grows with the cube of that of the surfaces."""
 
 
 def triangles(edges: Sequence[Edge], most: int = MOST_TRIANGLES, seed: int = 0) -> Integers:
