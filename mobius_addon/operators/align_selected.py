@@ -8,8 +8,9 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ... import solver
+from ...solver.surface.mesh import Booleans
 from .. import landmarks, results, stored_alignment
-from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
+from ..attributes import SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
@@ -28,6 +29,7 @@ class _Target:
     surface: Surface
     settings: solver.AlignSettings
     pairs: Any
+    within: Booleans | None
 
 
 def selected_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -74,9 +76,10 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
             own = read_surface(obj)
             outer = outer_vertex(source, surface, self), outer_vertex(obj, own, self)
             pairs = landmarks.from_scene(source, obj, (surface.mesh, own.mesh), self.landmarks)
-            targets.append(_Target(obj.session_uid, obj.name, own, align_settings(self, limit, outer), pairs))
+            settings, piece = align_settings(self, limit, outer), piece_of(obj, self.target_cut)
+            targets.append(_Target(obj.session_uid, obj.name, own, settings, pairs, piece))
         self._targets = targets
-        largest_part = self.largest_part
+        largest_part, within = self.largest_part, piece_of(source, self.source_cut)
 
         def work(report: Report) -> list[Aligned | str]:
             done: list[Aligned | str] = []
@@ -87,9 +90,9 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
                     return report(replace(now, stage=stage, fraction=(number + now.fraction) / len(targets)))
 
                 asked = {"largest_part": largest_part, "landmarks": target.pairs, "progress": tell}
-                keys = surface.keys, target.surface.keys
+                asked |= {"keys": (surface.keys, target.surface.keys), "within": (within, target.within)}
                 try:
-                    found = aligned(surface.mesh, target.surface.mesh, target.settings, keys=keys, **asked)
+                    found = aligned(surface.mesh, target.surface.mesh, target.settings, **asked)
                     done.append(Aligned(*found))
                 except solver.MeshError as error:
                     done.append(str(error))

@@ -8,6 +8,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import stored_alignment  # noqa: E402
 from mobius_extension.mobius_addon.jobs import Job  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 
 
 def choose(source, *targets) -> None:
@@ -56,3 +57,17 @@ def test_without_a_target_it_says_what_to_select() -> None:
     choose(source)
     with pytest.raises(RuntimeError, match="Select the meshes that 'S' is to be aligned with"):
         bpy.ops.mobius.align_selected(**QUICK)
+
+
+def test_the_piece_that_a_group_names_is_what_is_matched() -> None:
+    source, target = make_sheet("S", 15), make_sheet("A", 11)
+    right = [vertex.index for vertex in target.data.vertices if vertex.co.x > -0.1]
+    target.vertex_groups.new(name="Right").add(right, 1.0, "REPLACE")
+    choose(source, target)
+    with pytest.raises(RuntimeError, match="Nothing"):
+        bpy.ops.mobius.align_selected(**QUICK, target_cut="Nothing")
+    bpy.ops.mobius.align_selected(**QUICK, target_cut="Right")
+    found = stored_alignment.load(target, source, (read_surface(source), read_surface(target)))
+    known = np.flatnonzero(found.face >= 0)
+    assert len(known) > len(right) / 2
+    assert set(known) <= set(right)
