@@ -78,7 +78,27 @@ def align_pair(
     return alignment, correspondence
 
 
-def fitting_map(options: argparse.Namespace, surfaces: tuple[Surface, Surface]) -> Correspondence:
+def require_something_to_write(options: argparse.Namespace) -> None:
+    """Raise `Unreadable` where a map is given and one that would be made is to be written."""
+    from ..files import Unreadable
+
+    if options.use_map and (options.map or options.report):
+        raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+
+
+def matched_pair(
+    options: argparse.Namespace,
+    files: tuple[Imported, Imported],
+    surfaces: tuple[Surface, Surface],
+    settings: AlignSettings,
+) -> tuple[Alignment | None, Correspondence]:
+    """Return the correspondence of two surfaces: of the map that was given, or of an alignment made for it."""
+    if options.use_map:
+        return None, _fitting_map(options, surfaces)
+    return align_pair(options, files, surfaces, settings)
+
+
+def _fitting_map(options: argparse.Namespace, surfaces: tuple[Surface, Surface]) -> Correspondence:
     """Load the map that was given, and make sure that it is one between these two meshes."""
     from ...solver import load_map
     from ..files import Unreadable

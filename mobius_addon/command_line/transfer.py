@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..streams import DONE, NOT_ALIGNED, say, say_error
 from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
-from .pair import align_pair, fitting_map, opened_pair, read_pair
+from .pair import matched_pair, opened_pair, read_pair, require_something_to_write
 from .several_targets import one_by_one
 from .transfer_options import add_texture_options, add_transfer_options, transfer_settings
 
@@ -70,21 +70,16 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
     choices = transfer_settings(options)
     settings = align_settings(options)
-    if options.use_map and (options.map or options.report):
-        raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    require_something_to_write(options)
     if options.texture_map and "textures" not in choices.kinds:
         raise Unreadable("--texture-map is made with textures: say --only textures")
     _require_writable(options)
     if options.use_texture_map:
         _through_texture_map(options, choices)
         return
-    alignment = None
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
-        if options.use_map:
-            correspondence = fitting_map(options, surfaces)
-        else:
-            alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
+        alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
         keeps = options.texture_map is not None
         reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
         plan = reading.carry()

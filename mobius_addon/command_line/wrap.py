@@ -8,7 +8,7 @@ from pathlib import Path
 from ..streams import DONE, say
 from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
-from .pair import align_pair, fitting_map, opened_pair, read_pair
+from .pair import matched_pair, opened_pair, read_pair, require_something_to_write
 
 HELP = (
     "Wrap the source onto the target: a new object with the source's triangles, UV maps, groups, materials and shape "
@@ -32,27 +32,22 @@ def run(options: argparse.Namespace) -> int:
     """Align two meshes, write the fitted one, and return the exit status."""
     from ...solver import report, save_map
     from ...solver.carry.fitted import in_shape_of, wrapped
-    from ..files import Unreadable, outputs, write_mesh
+    from ..files import outputs, write_mesh
     from ..fitting import reshaped_object, wrapped_object
     from ..mesh_data import Refusal
     from ..operators.wrap import remarks
 
     settings = align_settings(options)
-    if options.use_map and (options.map or options.report):
-        raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    require_something_to_write(options)
     require_writable(
         [options.output],
         [options.map, options.report],
         inputs=[options.source, options.target, options.landmarks, options.use_map],
         overwrite=options.overwrite,
     )
-    alignment = None
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
-        if options.use_map:
-            correspondence = fitting_map(options, surfaces)
-        else:
-            alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
+        alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
         fit, make, own = (wrapped, wrapped_object, 0) if not options.shape_key else (in_shape_of, reshaped_object, 1)
         try:
             fitted = fit(correspondence, surfaces[0].mesh, surfaces[1].mesh)

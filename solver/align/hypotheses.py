@@ -12,6 +12,7 @@ from ..bend.bend import Draft, facing
 from ..bend.coarse import coarse
 from ..bend.moments import posed
 from ..bend.pose import FAR, misfit
+from ..search.outcome import SearchResult
 from ..search.rival import scored
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, TriangleMesh
@@ -44,12 +45,12 @@ class Hypothesis:
 
 def turned(matched: Alignment) -> Alignment | None:
     """Return the best of the orientation that was not taken, refined on all vertices; None if it was not searched."""
-    if matched.other is None:
-        return None
-    # what was said is of the one search and its rival
-    said = tuple(unproved(matched.other))
-    other = replace(matched, search=matched.other, other=matched.search, rival=None, warnings=said)
-    return taking(other, None, lambda _: None)
+    return None if matched.other is None else taking(_other_side(matched, matched.other), None, lambda _: None)
+
+
+def _other_side(matched: Alignment, other: SearchResult) -> Alignment:
+    """Return the alignment by the search of the other orientation; what was said is of the one and its rival."""
+    return replace(matched, search=other, other=matched.search, rival=None, warnings=tuple(unproved(other)))
 
 
 def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]:
@@ -90,8 +91,7 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
     found = matched
     if reflected != matched.mobius.reflected:
         assert matched.other is not None
-        said = tuple(unproved(matched.other))
-        found = replace(matched, search=matched.other, other=matched.search, rival=None, warnings=said)
+        found = _other_side(matched, matched.other)
     used = np.flatnonzero(np.isfinite(target.disc.real))
     face, barycentric = onto.nearest_point(start[used], TriangleMesh(start, faces).vertex_normals()[used])
     corners = onto.mesh.faces[face]

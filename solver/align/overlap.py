@@ -18,6 +18,7 @@ from ..bend.plate import RIM_REACH
 from ..flatten.flatten import Flattening
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
+from ..surface.topology import regions
 
 BEYOND = 0.01
 """How far past the other's boundary, in roots of the source's area, a point has no counterpart: what drafts err by."""
@@ -111,10 +112,10 @@ def piece(whole: Flattening, kept: Booleans) -> Piece | None:
     while True:
         if not wanted.any():
             return None
-        label = _parts(neighbour, wanted)
+        label = regions(mesh, wanted)
         area = np.bincount(label, mesh.face_areas * wanted)
         largest = label == np.argmax(area)
-        label = _parts(neighbour, largest)
+        label = regions(mesh, largest)
         open_parts = np.zeros(label.max() + 1, bool)
         open_parts[label[at_rim]] = True
         inside = largest | ~open_parts[label]
@@ -138,13 +139,3 @@ def piece(whole: Flattening, kept: Booleans) -> Piece | None:
         on_cut[vertices],
         int(outer[0]),
     )
-
-
-def _parts(neighbour: Integers, inside: Booleans) -> Integers:
-    """Return the number, (m,), of the part that each face is in: parts of the inside and of the outside."""
-    face, side = np.nonzero(neighbour >= 0)
-    other = neighbour[face, side]
-    same = inside[face] == inside[other]
-    count = len(neighbour)
-    links = coo_array((np.ones(same.sum()), (face[same], other[same])), shape=(count, count))
-    return connected_components(links, directed=False)[1].astype(np.intp)

@@ -71,9 +71,7 @@ def wrapped(correspondence: Correspondence, source: TriangleMesh, target: Triang
     ValueError
         Fewer than three vertices are matched.
     """
-    known = correspondence.matched & (correspondence.face >= 0)
-    if known.sum() < 3:
-        raise ValueError("fewer than three vertices are matched")
+    known = _known(correspondence)
     place = places(correspondence, source.vertices)[1]
     reflected = is_reflected(correspondence, source, target)
     weight = np.where(known, target.vertex_areas * correspondence.confidence, 0)
@@ -108,9 +106,7 @@ def in_shape_of(correspondence: Correspondence, source: TriangleMesh, target: Tr
     ValueError
         Fewer than three vertices are matched.
     """
-    known = correspondence.matched & (correspondence.face >= 0)
-    if known.sum() < 3:
-        raise ValueError("fewer than three vertices are matched")
+    known = _known(correspondence)
     place = places(correspondence, source.vertices)[1]
     reflected = is_reflected(correspondence, source, target)
     move = similarity(place[known], target.vertices[known], target.vertex_areas[known], reflected)
@@ -171,6 +167,14 @@ def folds(before: TriangleMesh, vertices: Floats) -> Booleans:
         return (mesh.face_vectors * around).sum(axis=1) < 0
 
     return against(TriangleMesh(vertices, before.faces)) & ~against(before)
+
+
+def _known(correspondence: Correspondence) -> Booleans:
+    """Return which target vertices, (n,), are matched; raises ValueError if they tell no pose."""
+    known = correspondence.matched & (correspondence.face >= 0)
+    if known.sum() < 3:
+        raise ValueError("fewer than three vertices are matched")
+    return known
 
 
 class _Plate:

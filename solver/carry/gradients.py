@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
 
 from ..surface.cholesky import factorised
 from ..surface.laplacian import cotangent_laplacian, cotangents, mollified_lengths
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges
 from .correspond import Correspondence
 from .frames import local_similarities, nearest_orthogonal
+from .parts import pieces
 
 REACH = 0.02
 """Length up to which gradients count more than the displacement itself, in square roots of the target's area.
@@ -179,9 +179,8 @@ def _tells(basis: Floats, target: TriangleMesh, scale: Floats) -> Booleans:
 
 def parts_of(target: TriangleMesh) -> tuple[Integers, Integers]:
     """Return the number of the part that each vertex, (n,), and each triangle, (m,), is in; 0 is the largest."""
-    low, high = target.edges.T
-    size = len(target.vertices)
-    part = connected_components(csr_array((np.ones(len(low)), (low, high)), shape=(size, size)), directed=False)[1]
+    part = pieces(target.faces, len(target.vertices))
+    part[part < 0] = part.max(initial=-1) + 1  # what is in no triangle has no area
     order = np.argsort(-np.bincount(part, target.vertex_areas), kind="stable")
     number = np.argsort(order, kind="stable")[part]
     return number, number[target.faces[:, 0]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -135,7 +136,7 @@ class Collection:
     failures: dict[str, str]
     settings: AlignSettings
 
-    @property
+    @cached_property
     def atlas(self) -> Atlas:
         """The maps."""
         known = dict(zip(self.edges, self.figures, strict=True))

@@ -130,12 +130,7 @@ def search(
     """
     if not 0 < z_max < 1:
         raise ValueError(f"z_max must lie between 0 and 1, not {z_max}")
-    if time_limit is not None and not time_limit >= 0:
-        raise ValueError(f"time_limit must be a number of seconds, not {time_limit}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, not {threads}")
-    if not gap >= 0:
-        raise ValueError(f"gap must be a share of the value, 0 or more, not {gap}")
+    require_ends(time_limit, threads, gap)
     started = time.perf_counter()
 
     def until(value: float, bound: float, nodes: int) -> bool:
@@ -151,6 +146,16 @@ def search(
     tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
     cancelled = watched(work, state.halt, deadline, tell)
     return state.result(time.perf_counter() - started, cancelled)
+
+
+def require_ends(time_limit: float | None, threads: int | None, gap: float) -> None:
+    """Raise ValueError unless these can end a search."""
+    if time_limit is not None and not time_limit >= 0:
+        raise ValueError(f"time_limit must be a number of seconds, not {time_limit}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, not {threads}")
+    if not gap >= 0:
+        raise ValueError(f"gap must be a share of the value, 0 or more, not {gap}")
 
 
 class Search:

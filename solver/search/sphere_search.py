@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..mobius import SphereMobius
 from ..stages import SearchProgress
 from ..surface.mesh import Floats
-from .branch_and_bound import CENTRES, NEAR, SMALLEST_CELL, Search
+from .branch_and_bound import CENTRES, NEAR, SMALLEST_CELL, Search, require_ends
 from .kernels import MOST_POINTS
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
 from .kernels.sphere_kernels import sphere_kernels_for
@@ -140,12 +140,7 @@ def sphere_search(
     """
     if not 0 <= h_max <= MOST_H:
         raise ValueError(f"h_max must lie between 0 and {MOST_H}, not {h_max}")
-    if time_limit is not None and not time_limit >= 0:
-        raise ValueError(f"time_limit must be a number of seconds, not {time_limit}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, not {threads}")
-    if not gap >= 0:
-        raise ValueError(f"gap must be a share of the value, 0 or more, not {gap}")
+    require_ends(time_limit, threads, gap)
     started = time.perf_counter()
 
     def work() -> None:

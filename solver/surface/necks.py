@@ -16,12 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from .cholesky import factorised
 from .intrinsic_delaunay import IntrinsicTriangulation, edge_weights, intrinsic_delaunay, non_negative_laplacian
 from .laplacian import mollified_lengths
 from .mesh import Booleans, Floats, TriangleMesh
+from .topology import regions
 
 LEVELS = 80
 """Levels followed from each extremity, evenly in the logarithm of the area above them: 6 % from one to the next."""
@@ -248,10 +249,5 @@ def _piece(mesh: TriangleMesh, chosen: Booleans, tip: int) -> Neck:
 
 def _around(mesh: TriangleMesh, chosen: Booleans, tip: int) -> Booleans:
     """Return the connected part of chosen faces, (m,), that is around a vertex."""
-    paired = np.flatnonzero(mesh.twins >= 0)
-    left, right = paired // 3, mesh.twins[paired] // 3
-    same = chosen[left] == chosen[right]
-    count = len(mesh.faces)
-    links = coo_array((np.ones(int(same.sum()), np.int8), (left[same], right[same])), shape=(count, count))
-    label = connected_components(links, directed=False)[1]
+    label = regions(mesh, chosen)
     return label == label[int(np.flatnonzero((mesh.faces == tip).any(axis=1))[0])]

@@ -206,6 +206,16 @@ def require_sphere(mesh: TriangleMesh) -> Topology:
     return found
 
 
+def regions(mesh: TriangleMesh, inside: Booleans) -> Integers:
+    """Return the number, (m,), of the region that each face is in: connected parts of the inside and of the outside."""
+    sides = np.flatnonzero(mesh.twins >= 0)
+    face, other = sides // 3, mesh.twins[sides] // 3
+    same = inside[face] == inside[other]
+    count = len(mesh.faces)
+    links = coo_array((np.ones(int(same.sum()), np.int8), (face[same], other[same])), shape=(count, count))
+    return connected_components(links, directed=False)[1].astype(np.intp)
+
+
 def _may_have_duplicates(mesh: TriangleMesh) -> bool:
     """Return False only if no two faces have the same vertices: at no edge are two faces with one vertex opposite."""
     paired = mesh.twins >= 0
