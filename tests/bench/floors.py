@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 SOLVER = Path(__file__).resolve().parents[2] / "solver"
-FLOORS = ("surface", "flatten", "search", "bend", "align", "carry")
+FLOORS = ("surface", "flatten", "search", "bend", "align", "carry", "collection")
 BETWEEN = ("mobius", "stages")
 
 
@@ -46,14 +46,19 @@ def imports() -> Counter[tuple[str, str]]:
 
 
 def main(output: str) -> None:
-    figure, axes = plt.subplots(figsize=(12.4, 6.4), dpi=120)
-    axes.set(xlim=(0, 12.4), ylim=(-0.15, 6.35))
+    figure, axes = plt.subplots(figsize=(14, 7.6), dpi=120)
+    axes.set(xlim=(0, 14), ylim=(-0.15, len(FLOORS) + 0.35))
     axes.axis("off")
     colors = plt.get_cmap("viridis")
-    levels = {floor: level for level, floor in enumerate(FLOORS)}
+    levels, top = {floor: level for level, floor in enumerate(FLOORS)}, len(FLOORS) - 1
     for floor, level in levels.items():
         box = FancyBboxPatch(
-            (0.1, level + 0.08), 9.9, 0.78, boxstyle="round,pad=0.04", lw=0, fc=(*colors(level / 6)[:3], 0.25)
+            (0.1, level + 0.08),
+            11.1,
+            0.78,
+            boxstyle="round,pad=0.04",
+            lw=0,
+            fc=(*colors(level / top)[:3], 0.25),
         )
         axes.add_patch(box)
         axes.text(0.25, level + 0.47, f"{floor}/", weight="bold", size=13, va="center")
@@ -67,17 +72,17 @@ def main(output: str) -> None:
     for (above, below), count in arrows.items():
         if below in BETWEEN:
             continue
-        x = 10.2 + 0.42 * (levels[above] - levels[below] - 1)
+        x = 11.4 + 0.42 * (levels[above] - levels[below] - 1)
         arrow = FancyArrowPatch(
             (x, levels[above] + 0.3), (x, levels[below] + 0.7), arrowstyle="-|>", mutation_scale=9,
-            lw=0.6 + 0.25 * count, color=colors(levels[above] / 6), alpha=0.7, connectionstyle="arc3,rad=-0.12",
+            lw=0.6 + 0.25 * count, color=colors(levels[above] / top), alpha=0.7, connectionstyle="arc3,rad=-0.12",
         )  # fmt: skip
         axes.add_patch(arrow)
     text = (
         "an arrow points to what is imported, thicker where more modules do;\n"
         "mobius and stages stand beside the stairs, for whoever needs them"
     )
-    axes.text(0.1, 6.2, text, size=9, va="center", color="0.3")
+    axes.text(0.1, len(FLOORS) + 0.2, text, size=9, va="center", color="0.3")
     figure.savefig(output, bbox_inches="tight")
 
 
