@@ -167,16 +167,21 @@ def write_alignment(
     surfaces: Any,
 ) -> None:
     """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
-    carried, still = alignment.mobius(alignment.source.disc), alignment.mobius(alignment.carried)
+    carried, still = alignment.mobius(alignment.source.places), alignment.mobius(alignment.carried)
     here, there = (
         tidy or solver.Cleaned.unchanged(surface.mesh)
         for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)
     )
-    results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
-    results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
-    carried = here.at_vertices(carried, np.nan)
-    used = np.isfinite(carried)
-    color = results.disc_color(np.where(used, carried, 0))
+    if alignment.source.domain.closed:  # no layout without a seam: the colors are where points lie on the sphere
+        places = here.at_vertices(carried, np.nan)
+        used = np.isfinite(places).all(axis=1)
+        color = np.column_stack([0.5 + 0.5 * np.nan_to_num(places), np.ones(len(places))])
+    else:
+        results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
+        results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
+        carried = here.at_vertices(carried, np.nan)
+        used = np.isfinite(carried)
+        color = results.disc_color(np.where(used, carried, 0))
     results.write_color(source, SHARED_COLOR, color, used)
     results.write_color(target, SHARED_COLOR, solver.interpolate(correspondence, color), correspondence.face >= 0)
     matched = np.where(correspondence.matched, correspondence.confidence, 0.0)

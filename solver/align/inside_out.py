@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Integers, MeshError
 from .alignment import Alignment
@@ -60,8 +60,9 @@ def _sure(found: Alignment) -> float:
     return float(found.confidence @ found.target.mesh.vertex_areas / found.target.mesh.area)
 
 
-def _bulge(flattening: Flattening) -> float:
+def _bulge(flattening: Flat) -> float:
     """Return the volume between a surface and the cone over its rim; negative where it bulges inwards."""
     mesh = flattening.mesh
-    corners = mesh.vertices[mesh.faces] - mesh.vertices[flattening.boundary].mean(axis=0)
+    about = flattening.boundary if len(flattening.boundary) else mesh.used
+    corners = mesh.vertices[mesh.faces] - mesh.vertices[about].mean(axis=0)
     return float(np.linalg.det(corners).sum() / 6)

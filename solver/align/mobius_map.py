@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from ..flatten.sphere import Flat
 from ..mobius import Mobius
 from ..search.branch_and_bound import SearchResult, search
 from ..search.matching import Objective
 from ..search.rival import Rival, best_rival
+from ..search.sphere_rival import best_sphere_rival
+from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
-from ..surface.mesh import Integers
+from ..surface.mesh import Integers, MeshError
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility, covering_radius
 from .prepared import Surface
 from .refine import refined
 from .settings import AlignSettings
+from .sphere_map import searched_sphere
 
 
 def roughly_aligned(
@@ -33,6 +38,7 @@ def roughly_aligned(
     source = source_surface.flattening
     clock.begin("flatten target", "Flattening the target", 0.1)
     target = target_surface.flattening
+    _require_alike(source, target)
     clock.begin("descriptors", "Measuring curvature", 0.2)
     source_descriptors = source_surface.descriptors(clock.within(0.2, 0.25))
     target_descriptors = target_surface.descriptors(clock.within(0.25, 0.3))
@@ -40,9 +46,9 @@ def roughly_aligned(
     source_samples = source_surface.source_points(settings.samples)
     target_samples = target_surface.target_points(settings.targets, clock.within(0.3, 0.4))
     problem = Objective(
-        source.disc[source_samples],
-        target.disc[target_samples],
-        covering_radius(target.disc[target_samples])
+        source.places[source_samples],
+        target.places[target_samples],
+        covering_radius(target.places[target_samples])
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
@@ -52,8 +58,9 @@ def roughly_aligned(
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
         target_samples = np.concatenate([target_samples, pairs[:, 1]])
-        problem = Objective(source.disc[source_samples], target.disc[target_samples], radius, weights)
-    found, other, said = _searched(problem, settings, clock)
+        problem = Objective(source.places[source_samples], target.places[target_samples], radius, weights)
+    search_all = searched_sphere if source.domain.closed else _searched
+    found, other, said = search_all(problem, settings, clock)
     warnings += said
     warnings += unproved(found)
     alignment = Alignment(
@@ -85,16 +92,33 @@ def roughly_aligned(
     return taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
 
 
+def _require_alike(source: Flat, target: Flat) -> None:
+    """Raise `MeshError` if one of the surfaces is closed and the other is not."""
+    if source.domain.closed != target.domain.closed:
+        one, two = (source, target) if source.domain.closed else (target, source)
+        raise MeshError(
+            f"'{one.mesh.name}' is closed and '{two.mesh.name}' is not: cut the first open where the second is, or "
+            "close the second"
+        )
+
+
 def unproved(found: SearchResult) -> list[str]:
     """Say it if a search ran out of time before its proof."""
-    if found.certified:
+    if found.certified or isinstance(found, SphereSearchResult):  # which says itself what it has proved
         return []
     share = 100 * found.gap / max(found.upper_bound, 1e-300)
     return [f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"]
 
 
-def rival_of(found: Alignment, known: list[Mobius], enough: float | None, clock: Part) -> Rival:
+def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Part) -> Rival:
     """Look for the best transformation that maps everything elsewhere than those known."""
+    if found.source.domain.closed:
+        rival = best_sphere_rival(
+            found.objective, known, time_limit=found.settings.time_limit, progress=clock.searching(0.15)
+        )
+        if rival is None:
+            raise Cancelled
+        return rival
     rival = best_rival(
         found.objective,
         known,

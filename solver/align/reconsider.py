@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def reconsidered(found: Alignment, matched: Alignment, clock: Part) -> Alignment
 
 def _fitting(matched: Alignment, clock: Part, *, best: bool) -> Alignment | None:
     """Return what the first of the search's maxima leads to that fits; `best`: it may be the best itself."""
-    known = [] if best else [matched.search.mobius]
+    known: list[Any] = [] if best else [matched.search.mobius]
     for number in range(HYPOTHESES):
         part = clock.part(number / HYPOTHESES, (number + 1) / HYPOTHESES)
         part.begin("reconsider", "Trying the next best map", 0.0)
@@ -106,7 +107,7 @@ def _fitting(matched: Alignment, clock: Part, *, best: bool) -> Alignment | None
 
 def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
     """Return by how much descriptors differ on average, in the draft, where it finds a counterpart; inf if nowhere."""
-    used = np.flatnonzero(there & np.isfinite(found.target.disc.real))
+    used = np.flatnonzero(there & found.target.mesh.used)
     if len(used) == 0:
         return np.inf
     face, barycentric = draft.located(found.target)

@@ -6,7 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from ..align.alignment import Alignment
-from ..mobius import Mobius
+from ..mobius import Mobius, SphereMobius
+from ..search.sphere_search import SphereSearchResult
 from .correspond import Correspondence
 
 
@@ -28,7 +29,17 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "gap": found.upper_bound - alignment.value,
         "certified": alignment.certified,
         "rival_taken": alignment.taken is not None,
-        "certified_for": f"|z| <= {alignment.settings.z_max:.4f}",
+        "certified_for": f"|h| <= {found.h_max:.4f}"
+        if isinstance(found, SphereSearchResult)
+        else f"|z| <= {alignment.settings.z_max:.4f}",
+        **(
+            {
+                "proved": found.proved,
+                "rotation": {"value": found.rotation_value, "upper_bound": found.rotation_bound},
+            }
+            if isinstance(found, SphereSearchResult)
+            else {}
+        ),
         "samples": len(alignment.source_samples),
         "targets": len(alignment.target_samples),
         "matches": len(alignment.matches),
@@ -61,5 +72,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
     }
 
 
-def _plain(mobius: Mobius) -> dict[str, Any]:
+def _plain(mobius: Mobius | SphereMobius) -> dict[str, Any]:
+    if isinstance(mobius, SphereMobius):
+        return {"h": list(mobius.h), "rotation": list(mobius.rotation), "reflected": mobius.reflected}
     return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..mobius import hyperbolic_disc, one_less_square
-from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.mesh import Complexes, Floats, Integers, Places
 from .pairs import MOST_PAIRS, PAIRS_AT_ONCE, Rows, nothing, rows_of, too_many
 from .rim import surely_within
 
@@ -307,9 +307,9 @@ def _disc_points(points: npt.ArrayLike, role: str) -> Complexes:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What is searched: points of both discs, the radii of the match discs and the weights of the pairs."""
+    """What is searched: points of both discs or spheres, the radii of the match discs and the weights of the pairs."""
 
-    source: Complexes
-    target: Complexes
+    source: Places
+    target: Places
     radius: Floats
     weights: Floats

@@ -55,7 +55,7 @@ images are off by less than 2^-44 and |m| by less than 2^-52 of 1; g is moved ou
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -64,9 +64,6 @@ from ..surface.mesh import Floats
 from .bounds import SLACK, Arcs
 from .kernels.nodes import HALF, X, Y
 from .kernels.sphere_nodes import BALL, FACE, HX, HZ
-
-if TYPE_CHECKING:
-    from .matching import Matching
 
 FACES = np.array(
     [
@@ -199,7 +196,7 @@ def widest_half_angle(near: Floats, far: Floats, cap: Floats) -> Floats:
     return np.where((tangent >= 0) & (near <= tangent) & (tangent <= far), widest * 2 * np.pi, angle)
 
 
-def enclosing_arcs(matching: Matching, nodes: Floats) -> Arcs:
+def enclosing_arcs(matching: Any, nodes: Floats) -> Arcs:
     """Return, for each cell, (C, 13), and each pair, an arc that holds every angle phi that matches it in the cell."""
     alpha, delta, near, far = images(matching.source, nodes)
     cap = caps(matching.centres, matching.radii)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -64,6 +64,11 @@ class SphereSearchResult(SearchResult):
         """Whether it is proved that no rotation has a larger Q than the transformation found."""
         return self.rotation_bound <= self.value
 
+    def as_reflected(self) -> SphereSearchResult:
+        """Return the result of a search on the reflected source as one on the source itself."""
+        mobius, rotation = (SphereMobius(x.h, x.rotation, True) for x in (self.mobius, self.rotation))
+        return replace(self, mobius=mobius, rotation=rotation)
+
     @property
     def proved(self) -> str:
         """What is proved, in words."""
@@ -89,6 +94,7 @@ def sphere_search(
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
     gap: float = 0.0,
+    most_nodes: int | None = None,
 ) -> SphereSearchResult:
     """Find the Möbius transformation that brings the greatest weight of source points into match caps of the target.
 
@@ -109,6 +115,9 @@ def sphere_search(
     gap : float
         The search ends as soon as `upper_bound` is proved to exceed `value` by at most this share of it. The rotations
         are searched to their end all the same.
+    most_nodes : int, optional
+        Cells whose bound is computed before the search of all transformations ends: unlike a time limit, the same on
+        every machine.
 
     Returns
     -------
@@ -144,7 +153,7 @@ def sphere_search(
         state.run(np.inf if time_limit is None else started + time_limit, threads or os.cpu_count() or 1)
 
     size = np.shape(source)
-    state = _SphereSearch(float(h_max), float(size[0] if size else 0), gap)
+    state = _SphereSearch(float(h_max), float(size[0] if size else 0), gap, most_nodes)
     deadline = None if time_limit is None else started + time_limit
     tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
     cancelled = watched(work, state.halt, deadline, tell)
@@ -161,9 +170,9 @@ class _SphereSearch(Search):
 
     identity = SphereMobius()
 
-    def __init__(self, h_max: float, limit: float, gap: float) -> None:
+    def __init__(self, h_max: float, limit: float, gap: float, most_nodes: int | None) -> None:
         super().__init__(h_max, limit, _never)
-        self.gap = gap
+        self.gap, self.most_nodes = gap, np.inf if most_nodes is None else most_nodes
         self.climbs_h = False
         self.hold = (0, whole_sphere(limit, 0)[0], 0.0)  # side, cell and angle of the best
         self.rotation, self.rotation_value, self.rotation_bound = SphereMobius(), 0.0, limit
@@ -194,7 +203,9 @@ class _SphereSearch(Search):
         side, cell, phi = self.hold
         self.climbs_h = True
         self._climb(side, cell, phi, self.value, FIRST_STEP)
-        self.until = lambda value, bound, nodes: self.gap > 0 and bound <= value * (1 + self.gap)
+        self.until = lambda value, bound, nodes: (
+            nodes >= self.most_nodes or (self.gap > 0 and bound <= value * (1 + self.gap))
+        )
         self.frontier = [whole_sphere(problem.limit, self.z_max) for problem in self.sides]
         self.finished_bound, self.unlooked = -np.inf, -np.inf
         super().run(deadline, threads)

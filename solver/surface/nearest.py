@@ -60,7 +60,7 @@ class SurfacePoints:
     @cached_property
     def _on_rim(self) -> Booleans:
         rim = np.zeros(len(self.mesh.vertices), bool)
-        rim[np.concatenate(self.loops)] = True
+        rim[np.concatenate([np.empty(0, np.intp), *self.loops])] = True
         return rim
 
     @cached_property
@@ -73,6 +73,8 @@ class SurfacePoints:
 
     def nearest_on_boundary(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the boundary's nearest point and its unit tangent there, (q, 3) each; to a quarter of an edge."""
+        if not self.loops:  # nobody asks for any
+            return points.copy(), np.zeros_like(points)
         tree, at, along = self._rim
         found = tree.query(points)[1]
         tangent = along[found]
