@@ -167,7 +167,8 @@ def write_alignment(
     surfaces: Any,
 ) -> None:
     """Write the shared UV layout, the colors and the groups of matched points on both meshes."""
-    carried, still = alignment.mobius(alignment.source.places), alignment.mobius(alignment.carried)
+    carried: Any = alignment.mobius(alignment.source.places)
+    still: Any = alignment.mobius(alignment.carried)
     here, there = (
         tidy or solver.Cleaned.unchanged(surface.mesh)
         for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)
@@ -229,6 +230,8 @@ def _proof(alignment: solver.Alignment) -> str:
         proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more{among}"
     elif alignment.taken is not None:
         proof = f"not the best match: another map has {search.value:.2f}"
+    elif isinstance(search, solver.SphereSearchResult):
+        proof = f"proved: {search.proved}" + ("; no rotation matches more" if search.rotations_certified else "")
     else:
         proof = f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
     return f"matched value {alignment.value:.2f} of at most {len(alignment.source_samples)}, {proof}"

@@ -10,7 +10,7 @@ import numpy as np
 from .cleaning import cleaned
 from .mesh import Floats, Integers, TriangleMesh, plural
 from .tidy import Cleaned
-from .topology import Topology, require_disc
+from .topology import Topology, require_disc, topology
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,8 @@ class Verdict:
     def repairs(self) -> tuple[str, ...]:
         """What will be done for the computation, each as the rest of a sentence."""
         loops = list(self.topology.boundary_loops)
+        if not loops:
+            return self.tidy.changes
         del loops[int(np.argmax(self.topology.loop_lengths))]
         closed = closing(loops)
         return (*self.tidy.changes, closed) if closed else self.tidy.changes
@@ -39,8 +41,11 @@ class Verdict:
     def describe(self) -> str:
         """Return one line that says what the mesh is and what will be done about it."""
         found = self.topology
-        rim = found.boundary_loops[int(np.argmax(found.loop_lengths))]
-        text = f"disc, {found.vertices:,} vertices, boundary of {len(rim):,} edges"
+        if found.is_sphere:
+            text = f"closed surface, {found.vertices:,} vertices"
+        else:
+            rim = found.boundary_loops[int(np.argmax(found.loop_lengths))]
+            text = f"disc, {found.vertices:,} vertices, boundary of {len(rim):,} edges"
         used = np.zeros(self.tidy.size, bool)
         used[self.tidy.original_faces] = True
         if n := int((~used).sum()):
@@ -58,10 +63,11 @@ def verdict(
     Raises
     ------
     MeshError
-        It cannot be made a disc; the text says why and what to do.
+        It cannot be made a disc and is no sphere; the text says why and what to do.
     """
     tidy = cleaned(mesh, largest_part=largest_part, fill_holes=fill_holes, keys=keys)
-    return Verdict(tidy, require_disc(tidy.mesh, fill_holes=fill_holes))
+    found = topology(tidy.mesh)
+    return Verdict(tidy, found if found.is_sphere else require_disc(tidy.mesh, fill_holes=fill_holes))
 
 
 def closing(openings: Sequence[Integers]) -> str:

@@ -1,4 +1,4 @@
-"""Closed surfaces through the whole pipeline: aligned on the sphere, bent, located, carried, reported, kept in files."""
+"""Closed surfaces through the whole pipeline: aligned on the sphere, bent, carried, reported, kept in files."""
 
 import json
 
@@ -20,6 +20,7 @@ from solver import (
     report,
     save_map,
     save_surface,
+    verdict,
 )
 from solver.flatten.distortion import signed_volumes
 from solver.flatten.locate import TriangulatedSphere
@@ -130,3 +131,8 @@ def test_cortex_left_and_right(real_mesh):
     assert (signed_volumes(found.carried, target.faces) > 0).all()
     assert found.search.rotations_certified
     assert found.search.relative_gap <= 0.05
+
+
+def test_a_closed_mesh_is_called_usable():
+    assert verdict(ball(300)).describe() == "closed surface, 300 vertices"
+    assert verdict(ball(300)).repairs == ()
