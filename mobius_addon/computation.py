@@ -119,17 +119,28 @@ def aligned(
     *,
     largest_part: bool = True,
     keys: tuple[Floats | None, Floats | None] = (None, None),
+    within: tuple[Booleans | None, Booleans | None] = (None, None),
     landmarks: Integers | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> tuple[Alignment, Correspondence]:
     """Return the alignment of two meshes put in order, and their correspondence in the triangles they came with.
 
     What was done to the meshes comes first among the alignment's warnings. `keys` are what shape keys say of which
-    vertices belong together. See `solver.align`.
+    vertices belong together, `within` the vertices of the pieces that are to be matched. See `solver.align`.
     """
     source_surface, target_surface = (
-        surface_of(mesh, fill_holes=settings.fill_holes, largest_part=largest_part, outer_vertex=outer, keys=own)
-        for mesh, outer, own in ((source, settings.source_outer, keys[0]), (target, settings.target_outer, keys[1]))
+        surface_of(
+            mesh,
+            fill_holes=settings.fill_holes,
+            largest_part=largest_part,
+            outer_vertex=outer,
+            keys=own,
+            within=piece,
+        )
+        for mesh, outer, own, piece in (
+            (source, settings.source_outer, keys[0], within[0]),
+            (target, settings.target_outer, keys[1], within[1]),
+        )
     )
     alignment = align(source_surface, target_surface, settings, progress, landmarks=landmarks)
     return alignment, correspond(alignment)

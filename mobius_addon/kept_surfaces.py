@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..solver import Surface, TriangleMesh
-from ..solver.surface.mesh import Floats
+from ..solver.surface.mesh import Booleans, Floats
 
 KEPT = 4
 """Surfaces whose flattening, curvature and points are kept: those of the last pair, and of the one before."""
@@ -19,13 +19,21 @@ def surface_of(
     largest_part: bool,
     outer_vertex: int | None,
     keys: Floats | None = None,
+    within: Booleans | None = None,
 ) -> Surface:
     """Return the surface that a mesh is, as it was prepared before if name, positions and faces are the same."""
-    moved = None if keys is None else keys.tobytes()
-    key = mesh.fingerprint, mesh.name, fill_holes, largest_part, outer_vertex, moved
+    moved, piece = (None if x is None else x.tobytes() for x in (keys, within))
+    key = mesh.fingerprint, mesh.name, fill_holes, largest_part, outer_vertex, moved, piece
     surface = _kept.pop(key, None)
     if surface is None:
-        surface = Surface(mesh, fill_holes=fill_holes, largest_part=largest_part, outer_vertex=outer_vertex, keys=keys)
+        surface = Surface(
+            mesh,
+            fill_holes=fill_holes,
+            largest_part=largest_part,
+            outer_vertex=outer_vertex,
+            keys=keys,
+            within=within,
+        )
     _kept[key] = surface  # the one used last comes last
     while len(_kept) > KEPT:
         del _kept[next(iter(_kept))]

@@ -6,7 +6,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from .options import ALIGN_OPTIONS, TRANSFER_OPTIONS
+from .options import ALIGN_OPTIONS, OF_SCENE, TRANSFER_OPTIONS
 from .registration import register_factory
 
 _SHIPPED = str(Path(__file__).parent)
@@ -29,7 +29,7 @@ class MOBIUS_OT_align_preset_add(AddPresetBase, bpy.types.Operator):
     preset_menu = "MOBIUS_PT_align_presets"
     preset_subdir = MOBIUS_PT_align_presets.preset_subdir
     preset_defines = ["settings = bpy.context.scene.mobius"]
-    preset_values = [f"settings.{name}" for name in ALIGN_OPTIONS if name != "landmarks"]
+    preset_values = [f"settings.{name}" for name in ALIGN_OPTIONS if name not in OF_SCENE]
 
 
 class MOBIUS_PT_transfer_presets(PresetPanel, bpy.types.Panel):

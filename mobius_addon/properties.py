@@ -8,12 +8,18 @@ draws.
 import bpy
 
 from . import overlay
+from .live import samplable
 from .options import AlignOptions, ScanOptions, TransferOptions
 from .usable import is_in_scene
 
 
 def _is_choosable(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type == "MESH" and is_in_scene(obj, settings.id_data)
+
+
+def _names_to_sample(settings: bpy.types.PropertyGroup, _context: bpy.types.Context, _typed: str) -> list[str]:
+    source = settings.source
+    return [] if source is None or source.type != "MESH" else samplable(source)
 
 
 class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.PropertyGroup):
@@ -30,6 +36,12 @@ class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.Prope
         description="Mesh to carry data to",
         type=bpy.types.Object,
         poll=_is_choosable,
+    )
+    live_attribute: bpy.props.StringProperty(
+        name="Attribute",
+        description="Vertex group or attribute of the source that the target follows",
+        search=_names_to_sample,
+        search_options={"SUGGESTION"},
     )
 
 
@@ -112,12 +124,14 @@ def register() -> None:
     bpy.types.Scene.mobius = bpy.props.PointerProperty(type=MobiusSettings)
     bpy.types.Mesh.mobius_alignment = bpy.props.PointerProperty(type=MobiusAlignment)
     bpy.types.Mesh.mobius_before = bpy.props.StringProperty()  # as `attributes.note` keeps it
+    bpy.types.Mesh.mobius_transferred = bpy.props.StringProperty()  # as `last_transfer` keeps it
     bpy.types.WindowManager.mobius_view = bpy.props.PointerProperty(type=MobiusView)
 
 
 def unregister() -> None:
     """Undo `register`."""
     del bpy.types.WindowManager.mobius_view
+    del bpy.types.Mesh.mobius_transferred
     del bpy.types.Mesh.mobius_before
     del bpy.types.Mesh.mobius_alignment
     del bpy.types.Scene.mobius

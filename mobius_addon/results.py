@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from ..solver.surface.mesh import Booleans, Complexes, Floats
 from .attributes import (
     DISC_LAYOUT,
+    LIVE_NAMES,
     MATCHED_GROUP,
     MAX_UV_MAPS,
     OWN_NAMES,
@@ -24,6 +25,7 @@ from .attributes import (
     note,
     persons_own,
 )
+from .live import remove_live
 from .mesh_data import Refusal, Surface, foreach
 
 _LAYOUT = AttributeAccess("FLOAT2", "CORNER", "vector", 2)
@@ -171,19 +173,20 @@ def clear_results(obj: bpy.types.Object) -> int:
     """
     mesh, groups, own = obj.data, obj.vertex_groups, persons_own(obj)
     layouts = OWN_NAMES & {DISC_LAYOUT, SHARED_LAYOUT}
-    kinds = ((_LAYOUT, layouts), (_COLOR, OWN_NAMES - layouts - {MATCHED_GROUP}))
+    kinds = ((_LAYOUT, layouts), (_COLOR, OWN_NAMES - layouts - {MATCHED_GROUP, *LIVE_NAMES}))
     names = [name for access, of_kind in kinds for name in access.existing(obj, sorted(of_kind))]
     for name in names:
         if name in layouts:
             mesh.uv_layers.remove(mesh.uv_layers[name])
         else:
             mesh.attributes.remove(mesh.attributes[name])
-    removed = len(names) + bool(mesh.mobius_alignment.target_fingerprint)
+    removed = len(names) + bool(mesh.mobius_alignment.target_fingerprint) + remove_live(obj)
     if MATCHED_GROUP in groups:
         groups.remove(groups[MATCHED_GROUP])
         removed += 1
     own.put_back(obj)
     mesh.property_unset("mobius_alignment")
     mesh.property_unset("mobius_before")
+    mesh.property_unset("mobius_transferred")
     mesh.update()
     return removed

@@ -71,6 +71,15 @@ def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
     return kept.source_size == len(source.data.vertices) and kept.source_fingerprint == fingerprint_of(source)
 
 
+def pair(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object] | None:
+    """Return the chosen source and target if they are aligned."""
+    settings = context.scene.mobius
+    source, target = settings.source, settings.target
+    if source is None or target is None or source.type != "MESH" or target.type != "MESH":
+        return None
+    return (source, target) if exists(target, source) else None
+
+
 def missing(target: bpy.types.Object, source: bpy.types.Object) -> str:
     """Return the sentence for a pair without an alignment."""
     return rpt_("'{}' has not been aligned with '{}' yet: press Align first").format(target.name, source.name)

@@ -45,12 +45,22 @@ def show_colors(context: bpy.types.Context) -> None:
     context.window_manager.mobius_view.legend = True
 
 
+def show_materials(context: bpy.types.Context) -> None:
+    """Have the viewport that shows colors show materials, with their pictures."""
+    space = space_of(context)
+    if space is not None and space.shading.type == "SOLID":
+        space.shading.type = "MATERIAL"
+
+
 def show_as_before(context: bpy.types.Context) -> None:
     """Undo `show_colors` in every viewport that still shows them, and take the overlay's pictures away."""
     for screen in bpy.data.screens:
         for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
             before = _before.pop(space.as_pointer(), None)
-            if before and (space.shading.type, space.shading.color_type) == ("SOLID", "VERTEX"):
+            if before and (space.shading.type, space.shading.color_type) in (
+                ("SOLID", "VERTEX"),
+                ("MATERIAL", "VERTEX"),
+            ):
                 space.shading.color_type = before[1]
                 space.shading.type = before[0]
     view = context.window_manager.mobius_view

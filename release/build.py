@@ -100,8 +100,9 @@ def get_wheels(wheels: Iterable[str], platform: str) -> None:
         if not runs_on(name, platform):
             continue
         if name.startswith(build_wheel.PACKAGE):
-            names = (*build_wheel.SOURCES, "build_wheel.py", "pyproject.toml")
-            sources = [build_wheel.HERE / source for source in names]
+            sources = [
+                build_wheel.HERE / source for source in (*build_wheel.SOURCES, "build_wheel.py", "pyproject.toml")
+            ]
             if not is_newer(WHEELS / name, sources) and build_wheel.wheel(platform, WHEELS).name != name:
                 raise BuildError(f"{MANIFEST} names '{name}', which is not what solver/search/kernels builds")
         elif not has_hash(WHEELS / name, pinned(name)):

@@ -3,6 +3,7 @@
 In the order of the pipeline, and of the folders, each of which imports only from those before it: a `TriangleMesh` is
 checked and measured (`surface`), flattened (`flatten`), searched for the best `Mobius` transformation (`search`), bent
 onto the other surface (`bend`), aligned as a whole (`align`) and turned into a dense map that carries values (`carry`).
+Many surfaces at once are a `collection`.
 """
 
 from .align import Alignment, AlignSettings, Surface, align, load_surface, prepare, save_surface

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVER = ROOT / "solver"
-FLOORS = ("surface", "stages", "mobius", "flatten", "search", "bend", "align", "carry")
+FLOORS = ("surface", "stages", "mobius", "flatten", "search", "bend", "align", "carry", "collection")
 """From the ground up: folders, and the two modules that stand between them."""
 
 

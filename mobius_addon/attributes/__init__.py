@@ -2,6 +2,12 @@
 
 from .access import (
     DISC_LAYOUT,
+    LIVE_CONFIDENCE,
+    LIVE_CORNERS,
+    LIVE_FACE,
+    LIVE_MATCHED,
+    LIVE_NAMES,
+    LIVE_WEIGHTS,
     MATCHED_GROUP,
     MAX_UV_MAPS,
     OWN_NAMES,
@@ -14,7 +20,7 @@ from .access import (
 )
 from .active import ActiveLayers, note, persons_own
 from .carrier import Carrier
-from .masks import mask_names, mask_weights
+from .masks import mask_names, mask_weights, piece_of
 from .plan import Carried, Transfer, restored_on_failure, write_transfers
 from .preview import Preview, preview
 from .reading import Reading, plan_transfer, read_transfer
@@ -27,6 +33,12 @@ from .vertex_groups import VertexGroupAccess
 __all__ = [
     "DISC_LAYOUT",
     "KINDS",
+    "LIVE_CONFIDENCE",
+    "LIVE_CORNERS",
+    "LIVE_FACE",
+    "LIVE_MATCHED",
+    "LIVE_NAMES",
+    "LIVE_WEIGHTS",
     "MATCHED_GROUP",
     "MAX_UV_MAPS",
     "OWN_NAMES",
@@ -55,6 +67,7 @@ __all__ = [
     "note",
     "numbered",
     "persons_own",
+    "piece_of",
     "plan_transfer",
     "preview",
     "read_transfer",

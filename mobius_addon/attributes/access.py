@@ -20,8 +20,16 @@ SHARED_LAYOUT = "Mobius"
 SHARED_COLOR = "Mobius Color"
 MATCHED_GROUP = "Mobius Matched"
 PATTERN_COLOR = "Mobius Pattern"
+LIVE_FACE = "Mobius Map Face"
+LIVE_CORNERS = ("Mobius Map Corner 1", "Mobius Map Corner 2", "Mobius Map Corner 3")
+LIVE_WEIGHTS = "Mobius Map Weights"
+LIVE_MATCHED = "Mobius Map Matched"
+LIVE_CONFIDENCE = "Mobius Map Confidence"
+LIVE_NAMES = (LIVE_FACE, *LIVE_CORNERS, LIVE_WEIGHTS, LIVE_MATCHED, LIVE_CONFIDENCE)
+"""The correspondence, as nodes read it."""
+
 OWN_NAMES = frozenset(
-    {DISC_LAYOUT, SHARED_LAYOUT, SHARED_COLOR, MATCHED_GROUP, PATTERN_COLOR}
+    {DISC_LAYOUT, SHARED_LAYOUT, SHARED_COLOR, MATCHED_GROUP, PATTERN_COLOR, *LIVE_NAMES}
     | {measure.attribute for measure in (*DISC_MEASURES, *MAP_MEASURES)}
 )
 """Names of what our own operators write to be looked at; they are no content to carry."""

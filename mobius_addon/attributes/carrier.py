@@ -15,6 +15,7 @@ from ...solver.carry.corners import CornerInterpolation
 from ...solver.carry.elements import edges_in_reach, source_of_corners, source_of_edges, source_of_faces
 from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.carry.frames import local_similarities
+from ...solver.carry.gradients import GradientTransfer
 from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
 
@@ -33,12 +34,16 @@ class Carrier:
     gap : str
         What vertices without a counterpart get: "leave", nothing; the value of the "nearest" that has one; a harmonic
         "fill" between those, and the nearest where values cannot be mixed.
+    keys_by : str
+        How displacements get their direction and size: by "gradients" of the whole deformation (`GradientTransfer`), or
+        each by the "frames" around its vertex (`local_similarities`).
     """
 
     correspondence: Correspondence
     source: Surface
     target: Surface
     gap: Literal["leave", "nearest", "fill"] = "leave"
+    keys_by: Literal["gradients", "frames"] = "gradients"
 
     def points(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per vertex, (n_source, ...), linearly.
@@ -50,7 +55,7 @@ class Carrier:
         (n_target,) bool
             Where there is a value: the other vertices have no counterpart.
         """
-        return self._filled(self._matrix @ values.astype(np.float64))
+        return self.filled(self._matrix @ values.astype(np.float64))
 
     def corners(self, values: Values) -> tuple[Values, Booleans]:
         """Carry values per face corner, (c_source, ...), never mixing the two sides of a seam; returns as `points`."""
@@ -72,7 +77,7 @@ class Carrier:
         at_vertex[vertex[known]] = result[known]
         beside = known & ~whole
         at_vertex[vertex[beside]] = result[beside]
-        at_vertex, reached = self._filled(at_vertex)
+        at_vertex, reached = self.filled(at_vertex)
         result[~known] = at_vertex[vertex[~known]]
         return result, np.bincount(self.target.corner_polygon, ~reached[vertex])[self.target.corner_polygon] == 0
 
@@ -132,9 +137,11 @@ class Carrier:
 
     def displacements(self, values: Values) -> tuple[Values, Booleans]:
         """Carry vectors per vertex, (n_source, 3), turned and scaled with the surface; returns as `points`."""
+        if self.keys_by == "gradients":
+            return self._filled(self._gradients(values))
         rotation, scale = self._similarities
         carried = self._matrix @ values
-        return self._filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
+        return self.filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
 
     def normals(self, values: Values) -> tuple[Values, Booleans]:
         """Carry unit vectors per face corner, (c_source, 3), turned with the surface; returns as `points`.
@@ -160,7 +167,7 @@ class Carrier:
             return sums / np.bincount(surface.corner_polygon)
         return weights
 
-    def _filled(self, values: Values) -> tuple[Values, Booleans]:
+    def filled(self, values: Values) -> tuple[Values, Booleans]:
         """Return values per vertex with the gap filled if it is to be, and where there is a value."""
         if self.gap == "leave" or (self.correspondence.face >= 0).all():
             return values, self.reached
@@ -215,6 +222,10 @@ class Carrier:
     @cached_property
     def _similarities(self) -> tuple[Floats, Floats]:
         return local_similarities(self.correspondence, self.source.rest, self.target.rest)
+
+    @cached_property
+    def _gradients(self) -> GradientTransfer:
+        return GradientTransfer.of(self.correspondence, self.source.rest, self.target.rest)
 
     @cached_property
     def _polygon_of_triangle(self) -> Integers:

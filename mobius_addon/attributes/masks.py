@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...solver.surface.mesh import Floats, Integers
+from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Refusal, foreach
 from .settings import Mask
 from .vertex_groups import read_weights
@@ -48,6 +48,15 @@ def mask_weights(obj: bpy.types.Object, mask: Mask) -> Floats | None:
     if not (weights >= 0.5).any():
         raise Refusal(f"The mask of '{obj.name}' excludes every vertex: choose another one or invert it")
     return weights
+
+
+def piece_of(obj: bpy.types.Object, name: str) -> Booleans | None:
+    """Return the vertices, (n,), of the piece that a vertex group or attribute names, or 'selection'; None for ''."""
+    if not name:
+        return None
+    mask = Mask("selected") if name == "selection" and name not in mask_names(obj) else Mask("named", name)
+    weights = mask_weights(obj, mask)
+    return None if weights is None else weights >= 0.5
 
 
 def _at_vertices(mesh: bpy.types.Mesh, domain: str, values: Floats) -> Floats:

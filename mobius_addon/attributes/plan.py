@@ -10,6 +10,8 @@ from typing import Any
 import bpy
 
 from ...solver.surface.mesh import Booleans
+from ..textures.reading import Textures
+from ..textures.writing import made_or_removed, write_textures
 from .carrier import Values
 from .key_set import KeyPlan
 from .record import remember, unedited
@@ -49,6 +51,8 @@ class Transfer:
         Sentences about what will not be written, or not under its own name.
     unmatched : Unmatched
         The part of the target that corresponds to nothing, and what is done about it.
+    textures : Textures or None
+        Pictures, if any are carried.
     """
 
     layers: tuple[Carried, ...]
@@ -57,6 +61,7 @@ class Transfer:
     shown_color: str | None
     warnings: tuple[str, ...]
     unmatched: Unmatched
+    textures: Textures | None = None
 
     def write(self, obj: bpy.types.Object) -> None:
         """Write every layer on the target; if that fails, the target is as it was."""
@@ -65,19 +70,21 @@ class Transfer:
     def counts(self) -> dict[str, int]:
         """Return how many layers of each kind are written, kinds with none left out."""
         found = {kind.identifier: sum(x.row.kind == kind.identifier for x in self.layers) for kind in KINDS}
+        if self.textures is not None:
+            found["textures"] = len(self.textures.made) + len(self.textures.colors)
         return {kind: number for kind, number in found.items() if number}
 
 
 def write_transfers(pairs: Sequence[tuple[bpy.types.Object, Transfer]]) -> None:
     """Write what was carried to each target; if one of them fails, all are as they were."""
-    with ExitStack() as stack:
+    with made_or_removed() as made, ExitStack() as stack:
         for obj, _ in pairs:
             stack.enter_context(restored_on_failure(obj))
         for obj, transfer in pairs:
-            _write(obj, transfer)
+            _write(obj, transfer, made)
 
 
-def _write(obj: bpy.types.Object, transfer: Transfer) -> None:
+def _write(obj: bpy.types.Object, transfer: Transfer, made: list[Any]) -> None:
     mesh = obj.data
     order = [group.name for group in obj.vertex_groups]
     earlier = unedited(obj)
@@ -96,6 +103,10 @@ def _write(obj: bpy.types.Object, transfer: Transfer) -> None:
         mesh.uv_layers[transfer.shown_uv].active_render = True
     if transfer.shown_color is not None:
         mesh.attributes.active_color_name = mesh.attributes.default_color_name = transfer.shown_color
+    if transfer.textures is not None:
+        source_map = transfer.textures.layout.source_name
+        written = {x.source_name: x.name for x in transfer.layers if x.row.kind == "uv"}
+        write_textures(obj, transfer.textures, made, written.get(source_map) if source_map else None)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from ...solver import Cancelled, Progress
 from ...solver.surface.mesh import Floats
 from ..mesh_data import Refusal
+from ..textures.reading import TextureReading, read_textures
 from .access import MAX_UV_MAPS, Layer
 from .carrier import Carrier, Values
 from .chosen import chosen_layers
@@ -57,6 +58,7 @@ class Reading:
     warnings: tuple[str, ...]
     names: tuple[str, str]
     unmatched: Unmatched
+    textures: TextureReading | None = None
 
     def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
         """Carry every layer.
@@ -70,9 +72,11 @@ class Reading:
         """
         warnings = list(self.warnings)
         layers: list[tuple[_Pending, Carried]] = []
+        # pictures take longer than everything else
+        share = 1.0 if self.textures is None else 0.1
         for number, pending in enumerate(self.pending):
             row, name = pending.row, pending.layer.name
-            step = Progress(f"{_LABELS[row.kind]} of '{self.names[1]}'", number / len(self.pending))
+            step = Progress(f"{_LABELS[row.kind]} of '{self.names[1]}'", share * number / len(self.pending))
             if progress is not None and progress(step) is False:
                 raise Cancelled
             carried, missing = self._carried(pending)
@@ -86,8 +90,10 @@ class Reading:
             if missing:
                 warnings.append(missing_warning(row, name, self.names[0], missing))
             layers.append((pending, carried))
-        if not layers:
+        if not layers and self.textures is None:
             raise Refusal(_nothing(self.names[0], self.settings, warnings))
+        textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))
+        warnings += () if textures is None else textures.notes
         placed, notes = self._placed(self._tidied(layers))
         settled, keys, more = self._settled(placed)
         maps = self.maps | {x.name for x in settled if x.row.kind == "uv"}
@@ -97,7 +103,21 @@ class Reading:
             )
         shown_uv, shown_color, others = self.looks.shown(settled, self.names)
         warnings += [*notes, *more, *others, *self.unmatched.warnings(self.names[1])]
-        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched)
+        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched, textures)
+
+    def _telling(
+        self, progress: Callable[[Progress], bool | None] | None, begun: float
+    ) -> Callable[[float], None] | None:
+        """Return what turns shares of the work on pictures into progress; it raises `Cancelled`."""
+        if progress is None:
+            return None
+
+        def tell(share: float) -> None:
+            step = Progress(f"{_LABELS['textures']} of '{self.names[1]}'", begun + share * (1 - begun))
+            if progress(step) is False:
+                raise Cancelled
+
+        return tell
 
     def _carried(self, pending: _Pending) -> tuple[Carried, int]:
         """Return a carried layer, and how many elements of the source have no number for it."""
@@ -175,6 +195,7 @@ def read_transfer(
     keys_carrier: Carrier | None = None,
     influence: Floats | None = None,
     unmatched: Unmatched | None = None,
+    keeps_texture_map: bool = False,
 ) -> Reading:
     """Read everything of the chosen kinds from the source, and what matters to it of the target.
 
@@ -193,6 +214,8 @@ def read_transfer(
         The target's mask, in [0, 1]; None: 1.
     unmatched : Unmatched, optional
         What is unmatched and what `carrier` does about it; by default what it says itself.
+    keeps_texture_map : bool
+        With textures, make a transfer map too.
 
     Raises
     ------
@@ -200,10 +223,11 @@ def read_transfer(
         Nothing to carry.
     """
     read, warnings, locked = [], [], []
+    along_keys = replace(keys_carrier or carrier, keys_by=settings.keys_by)
     for row in ROWS:
         if row.kind in settings.kinds:
             keys = row.kind == "shape-keys"
-            whence, way = (source, keys_carrier or carrier) if keys else (shown_source or source, carrier)
+            whence, way = (source, along_keys) if keys else (shown_source or source, carrier)
             layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
             if keys and not _groups_come_along(settings, shown_source):
                 layers = [limited(layer) for layer in layers]
@@ -230,7 +254,12 @@ def read_transfer(
             place = _place(row, target, layer.name, name, there.get(name), earlier, reserved)
             reserved |= {x for x in (place.before, place.beside) if x is not None}
             pending.append(_Pending(row, way, layer, place))
-    if not pending:
+    textures = None
+    if "textures" in settings.kinds:
+        textures = read_textures(
+            source, target, carrier, settings.textures, shown=shown_source, keeps_map=keeps_texture_map
+        )
+    if not pending and textures is None:
         raise Refusal(_nothing(source.name, settings, warnings))
     if target.data.users > 1:
         warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
@@ -250,6 +279,7 @@ def read_transfer(
         tuple(warnings),
         (source.name, target.name),
         unmatched or Unmatched.of(carrier),
+        textures,
     )
 
 

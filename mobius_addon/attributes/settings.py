@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Literal
 
+from ..textures.settings import TextureSettings
 from .table import KINDS
 
 Outcome = Literal["carry", "leave", "nearest", "fill"]
@@ -61,12 +62,16 @@ class TransferSettings:
     unmatched : str
         What vertices get that correspond to nothing with certainty: "carry" through the map all the same, "leave" what
         they have, the value of the "nearest" vertex that does, or a smooth "fill" between those.
+    keys_by : str
+        How shape keys get the target's directions and proportions, see `Carrier.keys_by`.
     evaluated : bool
         Read the source as its modifiers and shape keys show it.
     collisions : str
         Whether a layer whose name is taken by another of the person's own will "replace" that one or get Blender's
         "number"; what an earlier transfer wrote and nobody has edited is always replaced. Where `mix` or `target_mask`
         say how values join those that are there, they join them.
+    textures : TextureSettings
+        Choices about pictures.
 
     Raises
     ------
@@ -74,7 +79,7 @@ class TransferSettings:
         A number or word is outside its range.
     """
 
-    kinds: tuple[str, ...] = tuple(kind.identifier for kind in KINDS)
+    kinds: tuple[str, ...] = tuple(kind.identifier for kind in KINDS if kind.standard)
     layers: Literal["all", "active", "named"] = "all"
     names: tuple[str, ...] = ()
     deform_only: bool = False
@@ -86,8 +91,10 @@ class TransferSettings:
     source_mask: Mask = field(default_factory=Mask)
     target_mask: Mask = field(default_factory=Mask)
     unmatched: Outcome = "carry"
+    keys_by: Literal["gradients", "frames"] = "gradients"
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"
+    textures: TextureSettings = field(default_factory=TextureSettings)
 
     def __post_init__(self) -> None:
         if not 0 <= self.mix_factor <= 1:

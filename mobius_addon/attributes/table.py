@@ -24,6 +24,8 @@ class Kind:
     identifier: str
     label: str
     description: str
+    standard: bool = True
+    """Whether it is carried unless something else is said."""
 
     @property
     def noun(self) -> str:
@@ -48,6 +50,12 @@ KINDS = (
         "Attributes",
         "Other attributes: numbers with fractions are interpolated on points and face corners, anything else "
         "comes from the nearest element",
+    ),
+    Kind(
+        "textures",
+        "Textures",
+        "Pictures of the source's materials, drawn anew for the target's UV map, in a material of their own",
+        standard=False,
     ),
 )
 

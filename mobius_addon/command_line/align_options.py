@@ -22,6 +22,16 @@ def add_pair_options(parser: argparse.ArgumentParser, several_targets: bool = Fa
     add_repair_options(repair)
     repair.add_argument("--source-outer", type=int, metavar="VERTEX", help=f"of the source: {OUTER_HELP}")
     repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
+    cut = "vertex group or attribute around the piece that is matched, such as a head; 'selection': selected"
+    repair.add_argument("--source-cut", metavar="NAME", default="", help=f"of the source: {cut}")
+    repair.add_argument("--target-cut", metavar="NAME", default="", help="the same of the target")
+    repair.add_argument(
+        "--keep-whole",
+        dest="cut",
+        action="store_false",
+        default=True,
+        help="refuse a body that is too deep for a disc; by default the piece that fits the other mesh is cut out",
+    )
     _add_align_options(parser.add_argument_group("alignment"))
 
 
@@ -51,7 +61,7 @@ def align_settings(options: argparse.Namespace) -> AlignSettings:
     from ..files import Unreadable
 
     names = ("reflect", "refine", "take_rival", "samples", "targets", "radius", "z_max", "time_limit")
-    names += ("fill_holes", "source_outer", "target_outer")
+    names += ("fill_holes", "cut", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "time_limit" in given:
         given["time_limit"] = given["time_limit"] or None

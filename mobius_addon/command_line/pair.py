@@ -54,6 +54,7 @@ def align_pair(
     settings: AlignSettings,
 ) -> tuple[Alignment, Correspondence]:
     """Align two surfaces, which were read from these files, and say what was found."""
+    from ..attributes import piece_of
     from ..computation import aligned
     from ..operators.align import summary
 
@@ -68,12 +69,29 @@ def align_pair(
         largest_part=options.largest_part,
         keys=(source.keys, target.keys),
         landmarks=pairs,
+        within=(piece_of(files[0].obj, options.source_cut), piece_of(files[1].obj, options.target_cut)),
     )
     for warning in alignment.warnings:
         say_error(f"mobius: warning: {warning}")
     say(summary(options.source, options.target, alignment, correspondence))
     say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
     return alignment, correspondence
+
+
+def fitting_map(options: argparse.Namespace, surfaces: tuple[Surface, Surface]) -> Correspondence:
+    """Load the map that was given, and make sure that it is one between these two meshes."""
+    from ...solver import load_map
+    from ..files import Unreadable
+
+    path = options.use_map
+    if not path.is_file():
+        raise Unreadable(f"there is no file '{path}'")
+    try:
+        return load_map(path, *(surface.rest for surface in surfaces))
+    except OSError as error:
+        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise Unreadable(str(error)) from error
 
 
 def _landmarks(

@@ -6,9 +6,17 @@ import argparse
 from typing import Any
 
 from ..streams import say_error
-from . import align, check, demo, flatten, transfer
+from . import align, check, collection, demo, flatten, transfer, wrap
 
-_COMMANDS = {"demo": demo, "check": check, "flatten": flatten, "align": align, "transfer": transfer}
+_COMMANDS = {
+    "demo": demo,
+    "check": check,
+    "flatten": flatten,
+    "align": align,
+    "transfer": transfer,
+    "wrap": wrap,
+    "collection": collection,
+}
 
 
 class Usage(Exception):  # noqa: N818  (carries argparse's own exit)

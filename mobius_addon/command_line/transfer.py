@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..streams import DONE, NOT_ALIGNED, say, say_error
 from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
-from .pair import align_pair, opened_pair, read_pair
+from .pair import align_pair, fitting_map, opened_pair, read_pair
 from .several_targets import one_by_one
-from .transfer_options import add_transfer_options, transfer_settings
+from .transfer_options import add_texture_options, add_transfer_options, transfer_settings
 
 if TYPE_CHECKING:
-    from ...solver import Correspondence
-    from ..attributes import Transfer
-    from ..mesh_data import Surface
+    from ..attributes import Transfer, TransferSettings
 
 HELP = (
     "Carry what is on the source over to the target, or to each of several. With several, -o, --map and --report "
@@ -35,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
     add_transfer_options(parser.add_argument_group("transfer"))
+    add_texture_options(parser.add_argument_group("textures"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,27 +62,40 @@ def _transfer_to(options: argparse.Namespace) -> None:
     """Carry what is on the source over to one target."""
     from dataclasses import asdict
 
-    from ...solver import load_map, report, save_map
+    from ...solver import report, save_map
     from ..files import Unreadable, outputs, write_mesh
-    from ..operators.transfer import describe_counts, read_through
+    from ..files.pictures_beside import write_map, write_pictures
+    from ..last_transfer import describe_counts
+    from ..operators.transfer import read_through
 
     choices = transfer_settings(options)
     settings = align_settings(options)
     if options.use_map and (options.map or options.report):
         raise Unreadable("--use-map aligns nothing, so there is no --map or --report to write")
+    if options.texture_map and "textures" not in choices.kinds:
+        raise Unreadable("--texture-map is made with textures: say --only textures")
     _require_writable(options)
+    if options.use_texture_map:
+        _through_texture_map(options, choices)
+        return
     alignment = None
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
         if options.use_map:
-            correspondence = _fitting_map(load_map, options, surfaces)
+            correspondence = fitting_map(options, surfaces)
         else:
             alignment, correspondence = align_pair(options, (source, target), surfaces, settings)
-        plan = read_through(source.obj, target.obj, surfaces, correspondence, choices).carry()
+        keeps = options.texture_map is not None
+        reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
+        plan = reading.carry()
         plan.write(target.obj)
         order = orders(options.map, (source, target))
     with outputs() as written:
         backup = is_input(options.output, [options.source, options.target])
+        if options.texture_map:
+            write_map(plan.textures, options.texture_map, written)
+        if plan.textures is not None and not options.pack_textures:
+            write_pictures(target.obj, options.output, written)
         lost = write_mesh(target.obj, options.output, written, backup=backup)
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
@@ -98,28 +109,39 @@ def _transfer_to(options: argparse.Namespace) -> None:
     say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
 
 
+def _through_texture_map(options: argparse.Namespace, choices: TransferSettings) -> None:
+    """Carry the source's pictures through a transfer map."""
+    from ..attributes import restored_on_failure
+    from ..files import Unreadable, outputs, write_mesh
+    from ..files.pictures_beside import write_pictures
+    from ..last_transfer import describe_counts
+    from ..textures.by_map import read_map, textures_by_map
+    from ..textures.writing import made_or_removed, write_textures
+
+    if choices.kinds != ("textures",) or options.map or options.report or options.use_map or options.texture_map:
+        raise Unreadable("--use-texture-map carries pictures and aligns nothing: say --only textures, and no other map")
+    with opened_pair(options, write=True) as (source, target, notes):
+        surfaces = read_pair(options, source, target)
+        tiles = read_map(options.use_texture_map)
+        found = textures_by_map(source.obj, target.obj, surfaces, tiles, choices.textures)
+        with made_or_removed() as made, restored_on_failure(target.obj):
+            write_textures(target.obj, found, made)
+    with outputs() as written:
+        if not options.pack_textures:
+            write_pictures(target.obj, options.output, written)
+        backup = is_input(options.output, [options.source, options.target])
+        lost = write_mesh(target.obj, options.output, written, backup=backup)
+    warn([*notes, *found.notes, *lost])
+    say(f"{options.output}: {describe_counts({'textures': len(found.made)})} from {options.source}")
+
+
 def _require_writable(options: argparse.Namespace) -> None:
-    inputs = [options.source, options.target, options.use_map, options.landmarks]
-    others = [options.map, options.report]
+    inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
+    others = [options.map, options.report, options.texture_map]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 
 
-def _fitting_map(
-    load_map: Callable[..., Correspondence], options: argparse.Namespace, surfaces: tuple[Surface, Surface]
-) -> Correspondence:
-    """Load a map and make sure that it is one between these two meshes."""
-    from ..files import Unreadable
-
-    path = options.use_map
-    if not path.is_file():
-        raise Unreadable(f"there is no file '{path}'")
-    try:
-        return load_map(path, *(surface.rest for surface in surfaces))
-    except OSError as error:
-        raise Unreadable(f"'{path}' cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
-        raise Unreadable(str(error)) from error
-
-
 def _listed(plan: Transfer) -> list[dict[str, str]]:
-    return [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]
+    listed = [{"kind": layer.row.kind, "source": layer.source_name, "target": layer.name} for layer in plan.layers]
+    made = () if plan.textures is None else plan.textures.made
+    return listed + [{"kind": "textures", "source": x.channel.label, "target": x.channel.label} for x in made]

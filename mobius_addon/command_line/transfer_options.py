@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,7 +12,9 @@ if TYPE_CHECKING:
 
 def add_transfer_options(group: argparse._ArgumentGroup) -> None:
     """Add the choices of `attributes.TransferSettings`, whose defaults hold where none is given."""
-    group.add_argument("--only", metavar="KIND,...", help="carry these only; one unknown lists all")
+    group.add_argument(
+        "--only", metavar="KIND,...", help="carry these only; one unknown lists all; textures only where named"
+    )
     which = group.add_mutually_exclusive_group()
     which.add_argument("--names", metavar="NAME,...", help="carry layers of these names only; * and ? stand for any")
     which.add_argument("--active", action="store_true", help="carry the active layer of each kind only")
@@ -43,7 +46,50 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         "nearest matched value, a smooth fill",
     )
     group.add_argument(
+        "--shape-keys-by",
+        dest="keys_by",
+        choices=("gradients", "frames"),
+        help="how shape keys get the target's directions and proportions: by the gradients of the whole deformation "
+        "(default), or vertex by vertex by the frames of the surface",
+    )
+    group.add_argument(
         "--evaluated", action="store_true", help="the source as its modifiers and the mix of its shape keys show it"
+    )
+
+
+def add_texture_options(group: argparse._ArgumentGroup) -> None:
+    """Add the choices of `textures.settings.TextureSettings`."""
+    group.add_argument(
+        "--texture-size", type=int, metavar="N", help="side in texels; default: as many texels as the source has there"
+    )
+    group.add_argument(
+        "--texture-layout",
+        choices=("auto", "own", "carried", "disc"),
+        help="the target's own UV map, the source's carried, or the conformal disc; default: the first there is",
+    )
+    group.add_argument("--texture-margin", type=int, metavar="N", help="texels around islands; default: size / 256")
+    group.add_argument(
+        "--texture-result",
+        choices=("pictures", "attributes"),
+        help="pictures in a new material (default), or color attributes of what the pictures show",
+    )
+    group.add_argument(
+        "--texture-mask", action="store_true", help="a further picture: white where there is no certain counterpart"
+    )
+    group.add_argument(
+        "--texture-map",
+        metavar="MAP.exr",
+        type=Path,
+        help="write where each texel lies on the source: u, v, number of the material, confidence",
+    )
+    group.add_argument(
+        "--use-texture-map",
+        metavar="MAP.exr",
+        type=Path,
+        help="carry the source's pictures through this map, which was made for this target, and align nothing",
+    )
+    group.add_argument(
+        "--pack-textures", action="store_true", help="into the .blend, instead of into a folder OUT_textures beside it"
     )
 
 
@@ -51,6 +97,7 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
     """Return the choices of a transfer with the given options in place of the defaults."""
     from ..attributes import Mask, TransferSettings, split_names
     from ..files import Unreadable
+    from ..textures.settings import TextureSettings
 
     given = {"kinds": tuple(_kinds(options.only)), "evaluated": options.evaluated, "normalize": options.normalize}
     given |= {"deform_only": options.deform_only}
@@ -58,7 +105,7 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
         given |= {"layers": "named", "names": split_names(options.names)}
     elif options.active:
         given["layers"] = "active"
-    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched"):
+    for name in ("collisions", "mix", "mix_factor", "limit", "smallest_weight", "unmatched", "keys_by"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     for side in ("source", "target"):
@@ -69,6 +116,9 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
         elif invert:
             raise Unreadable(f"--invert-{side}-mask inverts --{side}-mask: give both")
     try:
+        names = ("size", "layout", "margin", "result", "mask")
+        chosen = {name: getattr(options, f"texture_{name}") for name in names}
+        given["textures"] = TextureSettings(**{name: x for name, x in chosen.items() if x is not None})
         return TransferSettings(**given)
     except ValueError as error:
         raise Unreadable(str(error)) from error
@@ -81,7 +131,7 @@ def _kinds(only: str | None) -> list[str]:
 
     known = [kind.identifier for kind in KINDS]
     if only is None:
-        return known
+        return [kind.identifier for kind in KINDS if kind.standard]
     wanted = [name.strip() for name in only.split(",") if name.strip()]
     if unknown := [name for name in wanted if name not in known]:
         raise Unreadable(f"--only does not know '{unknown[0]}': it takes {', '.join(known)}")

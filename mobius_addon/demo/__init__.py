@@ -19,9 +19,9 @@ from ... import solver
 from .. import stored_alignment
 from ..attributes import Carrier, plan_transfer
 from ..files import Unreadable, new_scene, outputs, require_folder, require_place
+from ..last_transfer import describe_counts
 from ..mesh_data import Refusal, Surface, read_surface
 from ..operators.align import summary, write_alignment
-from ..operators.transfer import describe_counts
 from ..streams import DONE, quiet, say, say_error
 from .accuracy import best_rigid_error, transfer_error
 from .paint import FACE_PAINT, GRID_UV, paint_source

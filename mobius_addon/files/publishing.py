@@ -80,16 +80,17 @@ class Outputs:
         Parameters
         ----------
         final : Path
-            A link is followed to what it points to.
+            A link is followed to what it points to. Its folder is made if it is not there.
         name : str, optional
             The file's name until then, after which an exporter names what it puts beside it.
         backup : bool
             Keep the file that is there as Blender does, with a number after its name.
         """
         final = real_place(final)
-        if final.parent not in self._folders:
-            self._folders[final.parent] = self._stack.enter_context(temporary_folder(final.parent))
-        folder, number = self._folders[final.parent], len(self._outputs)
+        home = final.parent if final.parent.is_dir() else final.parent.parent
+        if home not in self._folders:
+            self._folders[home] = self._stack.enter_context(temporary_folder(home))
+        folder, number = self._folders[home], len(self._outputs)
         if final.suffix.lower() == ".blend":
             written = folder.with_name(f"{folder.name}.{number}.blend")
         else:

@@ -12,10 +12,12 @@ from . import (
     discs,
     flatten,
     heat_map,
+    live,
     select_unmatched,
     side_by_side,
     swap,
     transfer,
+    wrap,
 )
 
 _register, _unregister = register_factory(
@@ -25,6 +27,8 @@ _register, _unregister = register_factory(
         swap.MOBIUS_OT_swap,
         align.MOBIUS_OT_align,
         transfer.MOBIUS_OT_transfer,
+        wrap.MOBIUS_OT_wrap,
+        live.MOBIUS_OT_live,
         select_unmatched.MOBIUS_OT_select_unmatched,
         conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ... import solver
 from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
-from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
+from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
@@ -63,7 +63,10 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         pairs = landmarks.from_scene(source, target, meshes, self.landmarks)
         keys = surfaces[0].keys, surfaces[1].keys
         moved = tuple(None if own is None else own.tobytes() for own in keys)
-        self._asked = meshes[0].fingerprint, meshes[1].fingerprint, moved, options, largest_part, pairs.tobytes()
+        within = piece_of(source, self.source_cut), piece_of(target, self.target_cut)
+        pieces = tuple(None if piece is None else piece.tobytes() for piece in within)
+        prints = meshes[0].fingerprint, meshes[1].fingerprint
+        self._asked = *prints, moved, pieces, options, largest_part, pairs.tobytes()
         found, repeated = _last.get(self._asked), self.options.is_repeat
 
         def work(report: Report) -> Aligned:
@@ -72,7 +75,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
             if repeated:  # the window would be frozen
                 text = rpt_("The result of '{}' is not known any more: call it again")
                 raise Refusal(text.format(rpt_(self.job_title)))
-            asked_for = {"largest_part": largest_part, "keys": keys, "landmarks": pairs}
+            asked_for = {"largest_part": largest_part, "keys": keys, "landmarks": pairs, "within": within}
             return Aligned(*aligned(*meshes, options, **asked_for, progress=report))
 
         return work

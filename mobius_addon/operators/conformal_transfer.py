@@ -7,14 +7,14 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import Correspondence
-from .. import results, stored_alignment
+from .. import last_transfer, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
 from ..jobs import Report, Work, why_busy
 from ..mesh_data import Refusal, read_surface
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, TRANSFER_OPTIONS, TransferOptions, draw_transfer, transfer_settings
 from ..usable import by_uid, why_not, why_not_mode, why_not_two
 from .align import Aligned, AlignOperator
-from .transfer import read_through, tell
+from .transfer import read_through
 
 
 class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Operator):
@@ -80,7 +80,7 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
             plan.write(target)
         if isinstance(result, Aligned):
             self.announce(source, target, result)
-        tell(self.report, target.name, source.name, plan)
+        last_transfer.announce(self.report, target, source.name, plan)
         if (scene := by_uid(bpy.data.scenes, self._scene)) is not None:
             scene.mobius.source, scene.mobius.target = source, target
 

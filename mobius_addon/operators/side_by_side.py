@@ -8,11 +8,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ...solver import MeshError
+from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..mesh_data import Refusal, read_surface, seen_positions
 from ..results import pattern_color, read_layout, require_room, write_color
+from ..textures.writing import has_pictures
 from ..usable import why_not_aligned
 
 COLLECTION = "Mobius Side by Side"
@@ -22,7 +24,7 @@ GAP = 0.15
 
 
 class MOBIUS_OT_side_by_side(bpy.types.Operator):
-    """Show copies of source and target beside each other, in one pose, with a pattern carried by the alignment."""
+    """Show copies of source and target beside each other, in one pose, with a pattern or pictures that were carried."""
 
     bl_idname = "mobius.side_by_side"
     bl_label = "Side by Side"
@@ -70,6 +72,8 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
             obj.select_set(obj in copies)
         context.view_layer.objects.active = copies[1]
         viewport.show_colors(context)
+        if has_pictures(target):
+            viewport.show_materials(context)
         viewport.look_at_selected_alone(context, np.concatenate([places[0], posed + right * step]))
         return {"FINISHED"}
 
@@ -127,22 +131,6 @@ def _remove(collection: bpy.types.Collection) -> None:
     for obj in list(collection.objects):
         bpy.data.objects.remove(obj)
     bpy.data.collections.remove(collection)
-
-
-def similarity(moving: Floats, fixed: Floats) -> Floats:
-    """Return the matrix, (4, 4), of rotation, uniform scale and shift that best carries points, (k, 3), onto others.
-
-    Least squares without a reflection: Umeyama, "Least-squares estimation of transformation parameters" (1991).
-    """
-    middle, aim = moving.mean(axis=0), fixed.mean(axis=0)
-    u, stretch, v = np.linalg.svd((fixed - aim).T @ (moving - middle))
-    sign = np.array([1, 1, np.sign(np.linalg.det(u @ v))])
-    turn = (u * sign) @ v
-    size = (stretch @ sign) / max(((moving - middle) ** 2).sum(), 1e-300)
-    matrix = np.eye(4)
-    matrix[:3, :3] = size * turn
-    matrix[:3, 3] = aim - size * turn @ middle
-    return matrix
 
 
 def _beside(first: Floats, second: Floats) -> float:

@@ -1,7 +1,6 @@
 """Carry data from the source to the target, or to many targets, through their last alignments."""
 
 # no postponed annotations here: Blender reads the properties from them
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -9,9 +8,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import Correspondence
-from .. import stored_alignment
+from .. import last_transfer, stored_alignment
 from ..attributes import (
-    KINDS,
     Carrier,
     Reading,
     Transfer,
@@ -92,15 +90,7 @@ class MOBIUS_OT_transfer(JobOperator, TransferOptions, bpy.types.Operator):
         pairs = list(zip(objects, result, strict=True))
         write_transfers(pairs)
         for obj, plan in pairs:
-            tell(self.report, obj.name, self._source, plan)
-
-
-def tell(report: Callable[[set[str], str], None], target: str, source: str, plan: Transfer) -> None:
-    """Report what a transfer has written."""
-    for warning in plan.warnings:
-        report({"WARNING"}, warning)
-    carried = describe_counts(plan.counts())
-    report({"INFO"}, rpt_("'{}' has {} from '{}'{}").format(target, carried, source, plan.unmatched.remark()))
+            last_transfer.announce(self.report, obj, self._source, plan)
 
 
 def read_through(
@@ -109,6 +99,8 @@ def read_through(
     surfaces: tuple[Surface, Surface],
     correspondence: Correspondence,
     settings: TransferSettings,
+    *,
+    keeps_texture_map: bool = False,
 ) -> Reading:
     """Read a source and a target for a transfer through a correspondence between them.
 
@@ -118,7 +110,7 @@ def read_through(
         As `mask_weights`, `evaluated` and `read_transfer`.
     """
     with _seen(source, surfaces[0], settings) as shown:
-        return _read(source, target, surfaces, correspondence, settings, shown)
+        return _read(source, target, surfaces, correspondence, settings, shown, keeps_texture_map)
 
 
 def _seen(
@@ -135,6 +127,7 @@ def _read(
     correspondence: Correspondence,
     settings: TransferSettings,
     shown: Shown | None,
+    keeps_texture_map: bool = False,
 ) -> Reading:
     """Read a source, or what is shown of it, and a target; see `read_through`."""
     own_surface, target_surface = surfaces
@@ -146,7 +139,15 @@ def _read(
 
     if shown is None:
         carrier, unmatched = between(correspondence, own_surface, source)
-        return read_transfer(source, target, carrier, settings, influence=influence, unmatched=unmatched)
+        return read_transfer(
+            source,
+            target,
+            carrier,
+            settings,
+            influence=influence,
+            unmatched=unmatched,
+            keeps_texture_map=keeps_texture_map,
+        )
     carrier, unmatched = between(shown.through(correspondence, own_surface), shown.surface, shown.lent)
     # shape keys are the original's own, in its own shape
     own = between(correspondence, own_surface, source)[0]
@@ -159,6 +160,7 @@ def _read(
         keys_carrier=own,
         influence=influence,
         unmatched=unmatched,
+        keeps_texture_map=keeps_texture_map,
     )
 
 
@@ -182,9 +184,3 @@ def selected_targets(context: bpy.types.Context, source: bpy.types.Object) -> li
         if twin := next((x for x in (source, *targets) if x != obj and x.data == obj.data), None):
             raise Refusal(f"'{obj.name}' and '{twin.name}' share one mesh: deselect one or make it single-user")
     return targets
-
-
-def describe_counts(counts: dict[str, int]) -> str:
-    """Return what a transfer carried, as in '3 vertex groups, 1 UV map'."""
-    nouns = {kind.identifier: kind.noun for kind in KINDS}
-    return ", ".join(f"{n} {nouns[kind] if n > 1 else nouns[kind].removesuffix('s')}" for kind, n in counts.items())

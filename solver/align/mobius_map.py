@@ -125,6 +125,7 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
         z_max=found.settings.z_max,
         enough=enough,
         time_limit=found.settings.time_limit,
+        threads=found.settings.threads,
         progress=clock.searching(0.15),
     )
     if rival is None:
@@ -162,6 +163,7 @@ def _searched(
             weights=problem.weights,
             z_max=settings.z_max,
             time_limit=settings.time_limit,
+            threads=settings.threads,
             progress=clock.searching(0.35 / len(sides)),
         )
         if result.cancelled:

@@ -11,6 +11,7 @@ from ..stages import Progress, Stages
 from ..surface.mesh import TriangleMesh
 from .alignment import Alignment
 from .confidence import BOUND
+from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
 from .inside_out import turned_round
 from .landmarks import own_landmarks
@@ -59,8 +60,9 @@ def align(
     clock = Stages(progress)
     source = _surface(source_mesh, settings, settings.source_outer)
     target = _surface(target_mesh, settings, settings.target_outer)
+    source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.1))
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
-    found = matched = roughly_aligned(source, target, settings, clock.part(0, 0.7), pairs)
+    found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
     if settings.refine == "dense":
         part = clock.part(0.7, 0.95)
         found = bent_densely(matched, drafted_from(matched, part), part, pairs)
@@ -70,7 +72,8 @@ def align(
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, clock.part(0.97, 1))
     clock.end()
-    found = replace(found, seconds=clock.seconds, warnings=(*source.notes, *target.notes, *found.warnings))
+    warnings = (*said, *source.notes, *target.notes, *found.warnings)
+    found = replace(found, seconds=clock.seconds, warnings=warnings)
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         found = replace(found, warnings=(*found.warnings, said))

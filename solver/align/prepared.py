@@ -17,10 +17,10 @@ from ..stages import Progress, Stages
 from ..surface.cleaning import cleaned
 from ..surface.descriptors import diffused_curvatures
 from ..surface.fairing import faired
-from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh, plural
+from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
-from ..surface.tidy import Cleaned
+from ..surface.tidy import Cleaned, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
 from .objective import interior, source_points
@@ -54,6 +54,8 @@ class Surface:
         Further coordinates of the vertices; see `surface.cleaned`.
     tidy : Cleaned or None
         The mesh in order, if it is already.
+    within : (n,) bool or None
+        Vertices among which the piece lies that is to be used; None: all of the mesh is.
     measured : (n, d) float64 or None
         The descriptors, once they are there.
     points : dict of str to dict of int to (k,) int
@@ -69,10 +71,11 @@ class Surface:
         largest_part: bool = False,
         keys: Floats | None = None,
         tidy: Cleaned | None = None,
+        within: Booleans | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
-        self.keys, self.tidy = keys, tidy
+        self.keys, self.tidy, self.within = keys, tidy, within
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
 
@@ -85,9 +88,14 @@ class Surface:
         """The mesh, put in order for the computation; raises `MeshError`."""
         if self.tidy is not None:
             return self.tidy
-        tidy = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
-        # a closed surface has an outside by itself
-        return tidy.turned() if _closed(tidy.mesh) and np.linalg.det(_tetrahedra(tidy.mesh)).sum() < 0 else tidy
+        found = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
+        if self.within is None and _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
+            return found.turned()  # a closed surface has an outside by itself
+        return found if self.within is None else piece_within(found, self.within)
+
+    def piece(self, chosen: Booleans, said: str) -> Surface:
+        """Return what some of its faces, (m,) of the mesh in order, are by themselves."""
+        return Surface(self.original, fill_holes=self.fill_holes, keys=self.keys, tidy=self.cleaned.only(chosen, said))
 
     @cached_property
     def flattening(self) -> Flat:
@@ -186,6 +194,7 @@ def prepare(
     outer_vertex: int | None = None,
     largest_part: bool = True,
     keys: Floats | None = None,
+    within: Booleans | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -202,6 +211,8 @@ def prepare(
         Leave out all parts but the one of largest area.
     keys : (n, d) float64, optional
         Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
+    within : (n,) bool, optional
+        Vertices among which the piece lies that is to be used, such as those of a head.
     progress : callable, optional
         As for `align`.
 
@@ -217,7 +228,12 @@ def prepare(
     whole = clock.part(0, 1)
     whole.begin("flatten", "Flattening", 0.0)
     surface = Surface(
-        mesh, fill_holes=settings.fill_holes, outer_vertex=outer_vertex, largest_part=largest_part, keys=keys
+        mesh,
+        fill_holes=settings.fill_holes,
+        outer_vertex=outer_vertex,
+        largest_part=largest_part,
+        keys=keys,
+        within=within,
     )
     _ = surface.flattening
     whole.begin("descriptors", "Measuring curvature", 0.3)

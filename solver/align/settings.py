@@ -37,12 +37,16 @@ class AlignSettings:
         Continue with the best rival in place of the winner, where the winner is the wrong one of an ambiguous pair.
     time_limit : float, optional
         Seconds for each search.
+    threads : int, optional
+        Of each search, which finds the same with any number; by default one for each processor.
     refine : str
         "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
         the source, smoothly and without folds.
     fill_holes : bool
         Allow meshes with openings and handles: all boundary loops but the outer one are closed for the computation, and
         small handles cut and closed. Without it such a mesh is refused.
+    cut : bool
+        Of a surface that no disc carries as a whole, as of a body, take the piece that fits the other one.
     source_outer, target_outer : int, optional
         A vertex on the loop that is to be the outer one; by default the longest loop is.
     """
@@ -57,8 +61,10 @@ class AlignSettings:
     reflect_margin: float = 0.06
     take_rival: bool = False
     time_limit: float | None = 60.0
+    threads: int | None = None
     refine: str = "dense"
     fill_holes: bool = True
+    cut: bool = True
     source_outer: int | None = None
     target_outer: int | None = None
 
@@ -76,5 +82,7 @@ class AlignSettings:
             raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
         if self.time_limit is not None and not self.time_limit >= 0:
             raise ValueError(f"time_limit must be a number of seconds, not {self.time_limit}")
+        if self.threads is not None and self.threads < 1:
+            raise ValueError(f"threads must be at least 1, not {self.threads}")
         if not 0 < self.compatible <= 1:
             raise ValueError(f"compatible must be a share above 0 and at most 1, not {self.compatible}")

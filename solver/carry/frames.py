@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
-from ..surface.mesh import Floats, Integers, TriangleMesh
+from ..surface.cholesky import factorised
+from ..surface.laplacian import laplacian
+from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from .correspond import Correspondence
 from .interpolate import interpolate, places
 
@@ -14,13 +16,16 @@ _PIECE = 2048
 
 
 def local_similarities(
-    correspondence: Correspondence, source: TriangleMesh, target: TriangleMesh
+    correspondence: Correspondence, source: TriangleMesh, target: TriangleMesh, reach: float = 0.0
 ) -> tuple[Floats, Floats]:
     """Return how directions and lengths around each target vertex come from the source: (n, 3, 3) and (n,).
 
     The orthogonal matrix is the one that turns the sides of the triangles around a vertex, and the normal, best from
     the source onto the target (Kabsch 1976); a reflection everywhere if the map mirrors the surface, else nowhere.
     The scale is the ratio of the lengths of those sides. Both are the identity where no triangle is known whole.
+
+    With a `reach`, in length units of the target, what is best is so for all that lies around within about that
+    distance on the surface: sums over vertices are diffused by one implicit step of that length.
     """
     face, place = places(correspondence, source.vertices)
     triangles = target.faces[(face[target.faces] >= 0).all(axis=1)]
@@ -37,10 +42,29 @@ def local_similarities(
     known = (there_square > 0) & (here_square > 0)
     weight = np.sqrt(there_square * here_square)[known, None, None]
     normals = here_normal[known, :, None] * there_normal[known, None]
+    wanted = products[known] / weight + normals
+    if reach > 0 and known.any():
+        return _diffused(target, reach, known, wanted, there_square, here_square)
     rotation = np.broadcast_to(np.eye(3), (size, 3, 3)).copy()
-    rotation[known] = nearest_orthogonal(products[known] / weight + normals)
+    rotation[known] = nearest_orthogonal(wanted)
     scale = np.ones(size)
     scale[known] = np.sqrt(here_square[known] / there_square[known])
+    return rotation, scale
+
+
+def _diffused(
+    target: TriangleMesh, reach: float, known: Booleans, wanted: Floats, there_square: Floats, here_square: Floats
+) -> tuple[Floats, Floats]:
+    """Return rotations and scales of sums that are diffused from the known vertices; see `local_similarities`."""
+    areas = np.maximum(target.vertex_areas, 1e-9 * target.area / len(known))
+    sums = np.zeros((len(known), 11))
+    sums[known, :9] = areas[known, None] * wanted.reshape(-1, 9)
+    sums[:, 9], sums[:, 10] = there_square, here_square
+    spread = factorised(csc_array(laplacian(target) + diags_array(areas / reach**2)))(sums)
+    reached = (spread[:, 9:] > 1e-12 * np.abs(spread[:, 9:]).max(axis=0)).all(axis=1)
+    rotation, scale = np.broadcast_to(np.eye(3), (len(known), 3, 3)).copy(), np.ones(len(known))
+    rotation[reached] = nearest_orthogonal(spread[reached, :9].reshape(-1, 3, 3))
+    scale[reached] = np.sqrt(spread[reached, 10] / spread[reached, 9])
     return rotation, scale
 
 

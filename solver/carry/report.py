@@ -8,14 +8,16 @@ from typing import Any
 from ..align.alignment import Alignment
 from ..mobius import Mobius, SphereMobius
 from ..search.sphere_search import SphereSearchResult
+from ..surface.tidy import Cleaned
 from .correspond import Correspondence
 
 
 def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, Any]:
     """Return the figures of an alignment as JSON-ready data: what was matched, what is proved, how long it took.
 
-    `coverage` is the share of the target's area whose vertices are matched. `value` to `rival` are about the whole
-    discs, `overlap` about the parts that both surfaces show, where these are less; `rival_margin` is the latter's then.
+    `coverage` is the share of the target's area whose vertices are matched, `cut_to` the shares that were aligned of
+    surfaces of which a piece was cut out. `value` to `rival` are about the whole discs, `overlap` about the parts that
+    both surfaces show, where these are less; `rival_margin` is the latter's then.
     """
     found, parts = alignment.search, alignment.overlap
     tidy = alignment.target_cleaned
@@ -50,6 +52,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         if alignment.rival is None
         else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
         "rival_margin": decisive.rival_margin,
+        "cut_to": {"source": _share(alignment.source_cleaned), "target": _share(tidy)},
         "overlap": None
         if parts is None
         else {
@@ -62,7 +65,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
             "matches": len(decisive.matches),
         },
         "vertices_unfolded": None if decisive.bending is None else decisive.bending.repaired,
-        "coverage": float(areas[correspondence.matched].sum() / areas.sum()),
+        "coverage": float(areas[correspondence.matched].sum() / areas.sum()) * _share(tidy),
         "mean_confidence": float(areas @ correspondence.confidence / areas.sum()),
         "distortion": {"source": asdict(alignment.source.distortion), "target": asdict(alignment.target.distortion)},
         "flips_repaired": {"source": alignment.source.flips_repaired, "target": alignment.target.flips_repaired},
@@ -70,6 +73,11 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "settings": asdict(alignment.settings),
         "warnings": list(alignment.warnings),
     }
+
+
+def _share(tidy: Cleaned | None) -> float:
+    """Return the share of the whole that was aligned, where that is a piece that was cut out."""
+    return 1.0 if tidy is None else tidy.share
 
 
 def _plain(mobius: Mobius | SphereMobius) -> dict[str, Any]:

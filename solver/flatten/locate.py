@@ -9,6 +9,9 @@ from scipy.spatial import KDTree
 
 from ..surface.mesh import Complexes, Floats, Integers, Places, face_neighbours
 
+AT_ONCE = 4096
+"""Queries outside whose nearest face is looked for at a time: some 100 MB of candidates."""
+
 
 @dataclass(frozen=True, eq=False)
 class TriangulatedDisc:
@@ -86,17 +89,19 @@ class TriangulatedDisc:
     def _nearest_face(self, queries: Places, candidates: int = 24) -> Integers:
         """Return the face nearest to each query among those around the nearest vertices."""
         k = min(candidates, self._tree.n)
-        near = np.asarray(self._tree.query(plane(queries), k=k)[1]).reshape(len(queries), k)
-        start = self._face_of_leaf[near]
-        best, best_distance = start[:, 0].copy(), np.full(len(queries), np.inf)
-        tried = np.concatenate([start, self.neighbours[start].reshape(len(queries), -1)], axis=1)
-        for column in tried.T:
-            face = np.where(column < 0, start[:, 0], column)
-            weights = self._clamped(face, queries)
-            distance = np.abs((self.points[self.faces[face]] * weights).sum(axis=1) - queries)
-            nearer = distance < best_distance
-            best[nearer], best_distance[nearer] = face[nearer], distance[nearer]
-        return best
+        result = np.empty(len(queries), np.intp)
+        for first in range(0, len(queries), AT_ONCE):
+            some = queries[first : first + AT_ONCE]
+            near = np.asarray(self._tree.query(plane(some), k=k)[1]).reshape(len(some), k)
+            start = self._face_of_leaf[near]
+            tried = np.concatenate([start, self.neighbours[start].reshape(len(some), -1)], axis=1)
+            tried = np.where(tried < 0, start[:, :1], tried)
+            face, repeated = tried.ravel(), np.repeat(some, tried.shape[1])
+            weights = self._clamped(face, repeated)
+            distance = np.abs((self.points[self.faces[face]] * weights).sum(axis=1) - repeated)
+            nearest = distance.reshape(tried.shape).argmin(axis=1)
+            result[first : first + len(some)] = tried[np.arange(len(some)), nearest]
+        return result
 
     def _clamped(self, face: Integers, queries: Places) -> Floats:
         """Return the barycentric coordinates of the point of each face nearest to its query."""

@@ -34,6 +34,11 @@ log |h| moves by at most a = half (|Re E| + |Im E|) + the two remainders, E = 1 
 *Width of a disc.* The circle of radius rho about 0 meets disc(b, e) in an arc of half-angle beta,
 sin^2(beta / 2) = (e^2 - (|b| - rho)^2) / (4 rho |b|) (eq. 12). Over rho it grows up to the length of the tangents,
 rho^2 = |b|^2 - e^2, where sin beta = e / |b|, and falls from there; if e >= |b| it falls throughout (eq. 30-32).
+Where |b| - e <= 2^-16 rounding may decide whether there are tangents. Their length squared, (|b| - e)(|b| + e), is off
+by less than 2^-45 then, the length by less than 2^-22: where rho is larger by that, beta falls, and before any angle
+is allowed. There e^2 - (|b| - rho)^2 is off by less than 4 e d < 2^-45 e, d as below; more than that is added, as rho
+may be much less than e. Discs with |b| < 2^-6, and so e < 2^-6 if there are tangents, are off by less than 2^-49 of
+themselves; 2^-16 and 2^-22 become 2^-10 |b| and 2^-16 |b|, where the length squared is off by less than 2^-46 |b|^2.
 
 *Rounding.* u = 2^-53. The centre of a cell and half are exact (dyadic). m - c is rounded once in each component,
 conj(m) c and 1 - . three times, so 1 - conj(m) c is off by less than 2^-50. Dividing by F = |1 - conj(m) c|, everything
@@ -120,12 +125,15 @@ def reaches(centre: Complexes, radius: Floats) -> tuple[Floats, Floats]:
 def tangents(centre: Complexes, radius: Floats) -> tuple[Floats, Floats]:
     """Return the length of the tangents to each disc and the half-angle between them, rounded up.
 
-    The length is -1 where the disc holds the centre or comes so near to it that rounding would matter.
+    The length is negative where the disc holds the centre or comes so near to it that rounding would matter: what it is
+    at most, 0 without tangents, and 2^-22 or less for the rounding; see the module's notes.
     """
     b, e = np.abs(centre), radius
-    apart = b - e > 2.0**-16
+    small = np.minimum(2.0**6 * b, 1)
+    apart = b - e > 2.0**-16 * small
     ratio = np.divide(e, b, out=np.ones_like(b), where=apart)
-    length = np.where(apart, np.sqrt(np.maximum((b - e) * (b + e), 0)), -1)
+    length = np.sqrt(np.maximum((b - e) * (b + e), 0))
+    length = np.where(apart, length, -np.maximum(length + 2.0**-22 * small, 2.0**-100))
     return length, np.arcsin(ratio) * (1 + 2.0**-48) + SLACK
 
 
@@ -180,13 +188,14 @@ def widest_half_angle(
     larger than it need be.
     """
     rho = np.where((tangent >= 0) & (far < tangent), far, near)
+    rest = np.where(tangent < 0, 2.0**-44 * e, 2.0**-48)
     with np.errstate(divide="ignore"):
-        square = ((e - (b - rho)) * (e + (b - rho)) + 2.0**-48) / (4 * rho * b) * (1 + 2.0**-48)
+        square = ((e - (b - rho)) * (e + (b - rho)) + rest) / (4 * rho * b) * (1 + 2.0**-48)
     sine = np.sqrt(np.clip(square, 0, 1))
     # the polynomial is off by less than s^5 / 2
     beta = 2 * np.where(sine**5 < tolerance, _arcsine(sine), np.arcsin(sine) + SLACK)
     beta = np.where(square < 1, beta, 2 * np.pi)
-    beta = np.where((tangent < 0) & (near < 2.0**-7), 2 * np.pi, beta)
+    beta = np.where((tangent < 0) & (near <= -tangent), 2 * np.pi, beta)
     return np.where((tangent >= near) & (tangent <= far), wide, beta)
 
 

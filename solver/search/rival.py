@@ -55,6 +55,7 @@ def best_rival(
     z_max: float,
     enough: float | None = None,
     time_limit: float | None,
+    threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
 ) -> Rival | None:
     """Search again without the pairs that known transformations bring near each other; None if cancelled.
@@ -64,7 +65,7 @@ def best_rival(
     objective : Objective
     known : sequence of Mobius
         All reflected, or none: the winner of a search, and rivals found before.
-    z_max, time_limit, progress :
+    z_max, time_limit, threads, progress :
         As for `search`.
     enough : float, optional
         The search ends as soon as it is decided whether a rival has this Q, and `LOOKED_AT` cells have been.
@@ -81,6 +82,7 @@ def best_rival(
         weights=np.where(elsewhere, objective.weights, 0.0),
         z_max=z_max,
         time_limit=time_limit,
+        threads=threads,
         progress=progress,
         enough=enough,
         at_least=LOOKED_AT,

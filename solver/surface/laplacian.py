@@ -33,12 +33,18 @@ def cotangents(lengths: Floats) -> Floats:
     return np.stack([y + z - x, z + x - y, x + y - z], axis=1) / (4 * area)[:, None]
 
 
-def cotangent_laplacian(faces: Integers, lengths: Floats, vertex_count: int) -> csr_array:
+def cotangent_laplacian(
+    faces: Integers, lengths: Floats, vertex_count: int, weights: Floats | None = None
+) -> csr_array:
     """Return the positive semidefinite cotangent Laplacian, (n, n): the Dirichlet energy of values u is u^T L u / 2.
 
-    Pinkall and Polthier (1993). Weight of an edge: half the sum of the cotangents opposite it.
+    Pinkall and Polthier (1993). Weight of an edge: half the sum of the cotangents opposite it, where each face counts
+    as much as its own weight, (m,), says.
     """
-    half = 0.5 * cotangents(lengths).ravel()
+    half = 0.5 * cotangents(lengths)
+    if weights is not None:
+        half *= weights[:, None]
+    half = half.ravel()
     i = faces[:, [1, 2, 0]].ravel()
     j = faces[:, [2, 0, 1]].ravel()
     rows = np.concatenate([i, j, i, j])

@@ -8,7 +8,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from .mesh import Booleans, Floats, Integers, TriangleMesh
+from .gluing import glue_of, vertices_of_glue
+from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh
 
 Value = TypeVar("Value", bound=np.generic)
 
@@ -34,6 +35,8 @@ class Cleaned:
         The vertex that each original vertex became; -1 where it is in no face that was kept.
     origin : (n,) int
         The original vertex of each vertex; for the first ones themselves.
+    share : float
+        Of the area of the surface that this is a piece of, if it was cut out of one; 1 for the whole.
     """
 
     mesh: TriangleMesh
@@ -43,6 +46,7 @@ class Cleaned:
     original_faces: Integers
     vertex_of: Integers
     origin: Integers
+    share: float = 1.0
 
     @staticmethod
     def unchanged(mesh: TriangleMesh) -> Cleaned:
@@ -55,6 +59,22 @@ class Cleaned:
         """Return it with all faces turned round."""
         mesh = TriangleMesh(self.mesh.vertices, self.mesh.faces[:, [0, 2, 1]], self.mesh.name)
         return replace(self, mesh=mesh, reversed=~self.reversed)
+
+    def only(self, chosen: Booleans, said: str) -> Cleaned:
+        """Return what some of its faces, (m,), are by themselves, and `said` among the changes."""
+        mesh = self.mesh
+        glue = glue_of(mesh.faces, mesh.twins).among(chosen)
+        faces, vertex_of, origin = vertices_of_glue(mesh.faces[chosen], glue, len(mesh.vertices))
+        return replace(
+            self,
+            mesh=TriangleMesh(mesh.vertices[origin], faces, mesh.name),
+            faces=self.faces[chosen],
+            reversed=self.reversed[chosen],
+            changes=(*self.changes, said),
+            vertex_of=np.where(self.vertex_of >= 0, vertex_of[self.vertex_of], -1),
+            origin=self.origin[origin],
+            share=self.share * float(mesh.face_areas[chosen].sum() / mesh.area),
+        )
 
     @property
     def size(self) -> int:
@@ -96,3 +116,23 @@ class Cleaned:
         """
         areas = self.mesh.vertex_areas
         return np.bincount(self.origin, areas, self.size).astype(np.float64, copy=False) if self.changes else areas
+
+
+def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
+    """Return the largest piece of a mesh in order that lies among some of the original's vertices, (n_original,).
+
+    Raises
+    ------
+    MeshError
+        No face does.
+    """
+    mesh = tidy.mesh
+    chosen = inside[tidy.origin][mesh.faces].all(axis=1)
+    if not chosen.any():
+        raise MeshError(f"'{mesh.name}' has no face among the vertices that it was to be cut to: choose others")
+    place = np.flatnonzero(chosen)
+    part = glue_of(mesh.faces, mesh.twins).among(chosen).parts(len(place))
+    area = np.bincount(part, mesh.face_areas[place])
+    chosen[place[part != np.argmax(area)]] = False
+    share = float(mesh.face_areas[chosen].sum() / mesh.area)
+    return tidy.only(chosen, f"cut to a piece of {share:.1%} of its area, as asked; the rest has no counterpart")

@@ -102,6 +102,11 @@ class Topology:
         return tuple(found)
 
     @property
+    def is_closed(self) -> bool:
+        """Whether all that keeps the mesh from being a disc is that it has no boundary."""
+        return not self.boundary_loops and len(self.problems()) == 1 and not self.handles and self.parts == 1
+
+    @property
     def handles(self) -> int:
         """Genus of an orientable manifold mesh in one part; 0 for discs and spheres."""
         return (2 * self.parts - len(self.boundary_loops) - self.euler_characteristic) // 2

@@ -9,6 +9,7 @@ import numpy as np
 
 from .cleaning import cleaned
 from .mesh import Floats, Integers, TriangleMesh, plural
+from .necks import necks
 from .tidy import Cleaned
 from .topology import Topology, require_disc, topology
 
@@ -23,14 +24,19 @@ class Verdict:
         The mesh in order.
     topology : Topology
         Of that.
+    hanging : tuple of float
+        Of a closed surface the shares of the pieces that hang on it by a neck, of which one is cut out to be matched.
     """
 
     tidy: Cleaned
     topology: Topology
+    hanging: tuple[float, ...] = ()
 
     @property
     def repairs(self) -> tuple[str, ...]:
         """What will be done for the computation, each as the rest of a sentence."""
+        if self.hanging:
+            return (*self.tidy.changes, self._cutting())
         loops = list(self.topology.boundary_loops)
         if not loops:
             return self.tidy.changes
@@ -41,7 +47,9 @@ class Verdict:
     def describe(self) -> str:
         """Return one line that says what the mesh is and what will be done about it."""
         found = self.topology
-        if found.is_sphere:
+        if self.hanging:
+            text = f"closed, {found.vertices:,} vertices"
+        elif found.is_sphere:
             text = f"closed surface, {found.vertices:,} vertices"
         else:
             rim = found.boundary_loops[int(np.argmax(found.loop_lengths))]
@@ -53,6 +61,12 @@ class Verdict:
         if n := len(found.zero_area_faces):
             text += f", {plural(n, 'face')} without area"
         return f"{text}; for the computation: {', '.join(self.repairs)}" if self.repairs else text
+
+    def _cutting(self) -> str:
+        """Say what will be cut out."""
+        shares = ", ".join(f"{share:.1%}" for share in self.hanging[:6]) + (", ..." if len(self.hanging) > 6 else "")
+        pieces = plural(len(self.hanging), "piece")
+        return f"cut to what fits the other surface, of {pieces} that hang on it by a neck ({shares} of its area)"
 
 
 def verdict(
@@ -67,6 +81,8 @@ def verdict(
     """
     tidy = cleaned(mesh, largest_part=largest_part, fill_holes=fill_holes, keys=keys)
     found = topology(tidy.mesh)
+    if found.is_closed and (hanging := necks(tidy.mesh)):
+        return Verdict(tidy, found, tuple(neck.share for neck in hanging))
     return Verdict(tidy, found if found.is_sphere else require_disc(tidy.mesh, fill_holes=fill_holes))
 
 

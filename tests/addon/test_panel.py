@@ -113,7 +113,7 @@ def test_an_edit_changes_the_line() -> None:
 
 def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
-    assert len(panels) == 7
+    assert len(panels) == 10
     for settings in ({"source": None}, {"source": pair[0]}):
         for name, value in settings.items():
             setattr(bpy.context.scene.mobius, name, value)
@@ -124,7 +124,7 @@ def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     settings.layers = settings.source_mask = settings.target_mask = "named"
     bpy.context.window_manager.mobius_view.matches = True
     for cls in panels:
-        assert drawn(cls)
+        assert drawn(cls) or cls is panel.MOBIUS_PT_last_transfer
     bpy.context.window_manager.mobius_view.matches = False
 
 
@@ -276,6 +276,33 @@ def test_german_covers_the_interface() -> None:
     for english, german in GERMAN.items():
         assert fields(english) == fields(german), english
         assert english.endswith(":") == german.endswith(":"), english
+
+
+# after a transfer
+
+
+def test_the_last_transfer_stands_in_the_panel_layer_by_layer(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    for number in range(10):
+        source.vertex_groups.new(name=f"Group {number}").add((number,), 0.5, "REPLACE")
+    target.vertex_groups.new(name="Right").add((1, 2), 0.25, "REPLACE")
+    target.vertex_groups.new(name="Group 0").lock_weight = True
+    bpy.ops.mobius.align(**QUICK)
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    bpy.ops.ed.undo_push(message="aligned")
+    bpy.ops.mobius.transfer("EXEC_DEFAULT", True, kinds={"VERTEX_GROUPS", "UV"})
+    assert panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    said = drawn(panel.MOBIUS_PT_last_transfer)
+    for text in ("From 'Source'", "Vertex Groups: 10", "UV Maps: 1", "UVMap", "Right → Right.001", "and 2 more"):
+        assert text in said
+    assert "Group 0" not in said
+    together = " ".join(said)
+    assert "'Group 0' is locked on 'Target' and left as it is" in together
+    assert "'Target' keeps its own vertex group 'Right'" in together
+    bpy.ops.ed.undo()
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
+    bpy.context.scene.mobius.target.data.mobius_transferred = '{"layers": 3}'
+    assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
 
 
 # before a transfer

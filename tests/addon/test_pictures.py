@@ -20,8 +20,10 @@ from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     shown_by,
     vertex_dilatations,
 )
-from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION, similarity  # noqa: E402
+from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION  # noqa: E402
+from mobius_extension.mobius_addon.overlay.matches import chosen_matches  # noqa: E402
 from mobius_extension.solver import Correspondence, TriangleMesh  # noqa: E402
+from mobius_extension.solver.carry.fitted import similarity  # noqa: E402
 
 ACCURATE = QUICK | {"samples": 40, "targets": 300, "refine": "mobius"}
 
@@ -147,11 +149,11 @@ def test_no_lines_once_a_mesh_was_edited(aligned: tuple[Any, Any]) -> None:
 
 
 def test_points_are_remembered_until_an_edit(aligned: tuple[Any, Any]) -> None:
-    first = overlay._chosen_matches(bpy.context)
+    first = chosen_matches(bpy.context)
     assert first is not None
-    assert overlay._chosen_matches(bpy.context) is first
+    assert chosen_matches(bpy.context) is first
     bpy.context.window_manager.mobius_view.count = 20
-    assert len(overlay._chosen_matches(bpy.context).target) == 20
+    assert len(chosen_matches(bpy.context).target) == 20
     bpy.context.window_manager.mobius_view.count = 200
     bpy.context.view_layer.objects.active = aligned[1]
     bpy.ops.object.mode_set(mode="EDIT")
@@ -159,7 +161,7 @@ def test_points_are_remembered_until_an_edit(aligned: tuple[Any, Any]) -> None:
     bpy.ops.transform.translate(value=(0, 0, 1))
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
-    assert overlay._chosen_matches(bpy.context) is None
+    assert chosen_matches(bpy.context) is None
 
 
 # draw handlers

@@ -107,7 +107,8 @@ def test_locked_keys_and_vertices_without_counterpart_stay_as_they_are() -> None
 def test_a_shape_on_a_bent_surface_keeps_its_height_over_it() -> None:
     source, target = make_sheet("Source", 21, flat), make_sheet("Target", 21, lambda x, y: 2 * bumps(x, y))
     add_key(source, "Up", np.tile([0.0, 0.0, 0.1], (441, 1)))
-    plan_transfer(source, target, same_vertices(source, target), TransferSettings(kinds=("shape-keys",))).write(target)
+    settings = TransferSettings(kinds=("shape-keys",), keys_by="frames")
+    plan_transfer(source, target, same_vertices(source, target), settings).write(target)
     arrived = shape(target, "Up") - positions(target)
     normal = np.array([vertex.normal[:] for vertex in target.data.vertices])
     length = np.linalg.norm(arrived, axis=1)

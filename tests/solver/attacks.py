@@ -39,7 +39,7 @@ def cornered_problem(rng: np.random.Generator, most: int = 8) -> tuple[Matching,
     """A matching where everything is at the edge of what is allowed, a transformation that matches much, and z_max.
 
     Points on the rim, 1e-16 from it and coincident; discs of 1e-12 and of nearly everything, with the images of source
-    points on their edges; weights of 0, of 1, next to these, and equal ones.
+    points, or 0, on their edges; weights of 0, of 1, next to these, and equal ones.
     """
     n1, n2 = rng.integers(1, most + 1, 2)
     z_max = float(rng.choice([0.3, 0.9, 0.95, 1 - 1e-6, 1 - 1e-12]))
@@ -53,6 +53,8 @@ def cornered_problem(rng: np.random.Generator, most: int = 8) -> tuple[Matching,
     target = pushed_out(rng, nasty_points(rng, n2))
     image = planted(source[rng.integers(0, n1, n2)])
     target = np.where(rng.random(n2) < 0.5, image, target)
+    through = rng.random(n2) < 0.25
+    target[through] *= 10.0 ** rng.uniform(-8, 0, through.sum())
     metric = str(rng.choice(["hyperbolic", "euclidean"]))
     hyperbolic = metric == "hyperbolic"
     target *= np.minimum(1, (1 - 2.0**-51 if hyperbolic else 1) / np.maximum(np.abs(target), 1e-300))
@@ -63,6 +65,9 @@ def cornered_problem(rng: np.random.Generator, most: int = 8) -> tuple[Matching,
         apart = np.abs(image - target) / (np.abs(1 - np.conj(target) * image) if hyperbolic else 1)
     tie = (rng.random(n2) < 0.5) & (apart > 0) & (apart < 1)
     radius[tie] = np.minimum(apart[tie] * rng.choice([1, 1, 1 - 1e-15, 1 + 1e-15, 1 - 1e-9], tie.sum()), 1 - 1e-16)
+    # an edge through 0, next to it, or around it
+    radius[through] = np.abs(target[through]) * rng.choice([1, 1 - 1e-9, 1 + 1e-9, 1.5, 1 - 1e-4], through.sum())
+    radius = np.clip(radius, 1e-12, 1 - 1e-16 if hyperbolic else 2)
     kind, weights = rng.integers(0, 4), None
     if kind == 1:
         weights = rng.integers(0, 2, (n1, n2)).astype(float)

@@ -1,4 +1,4 @@
-"""Build the wheel `mobius_kernels`: kernels.c as shared libraries, for this platform or for all.
+"""Build the wheel `mobius_kernels`: kernels.c and texels.c as shared libraries, for this platform or for all.
 
 A build backend (PEP 517), so that installing this folder compiles it, and a command::
 
@@ -23,7 +23,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = "mobius_kernels"
-SOURCES = ("kernels.c", "sphere.c")
+SOURCES = ("kernels.c", "sphere.c", "texels.c")
 # without contraction and reassociation every machine computes the same numbers; errno and traps are not looked at
 FLAGS = ["-std=c11", "-O3", "-shared", "-Wall", "-Wextra", "-Werror"]
 FLAGS += ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-s"]
@@ -76,7 +76,9 @@ def compile_library(target: Platform, processor: str, output: Path) -> None:
     if target.ending == "dylib":
         command.append(f"-Wl,-install_name,@rpath/{output.name}")  # else the folder it was compiled in
     done = subprocess.run(
-        [*command, *(str(HERE / name) for name in SOURCES), "-o", str(output)], capture_output=True, text=True
+        [*command, *(str(HERE / source) for source in SOURCES), "-lm", "-o", str(output)],
+        capture_output=True,
+        text=True,
     )
     if done.returncode:
         raise SystemExit(f"compiling the kernels for {target.tag} failed:\n{done.stderr}")

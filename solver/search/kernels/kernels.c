@@ -36,7 +36,7 @@
 #define CHILDREN 4
 #endif
 
-#define INTERFACE 9
+#define INTERFACE 11
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -340,12 +340,15 @@ static inline double pair_half_width(const Pair *pair, double near, double far, 
 #else
 /* ../bounds.py: widest_half_angle, in turns. The widest circle is that of the tangents' length, if it is in reach. */
 static inline double pair_half_width(const Pair *pair, double near, double far, double tolerance) {
-    double rho = near, b = pair->b, e = pair->e;
+    double rho = near, b = pair->b, e = pair->e, rest = 0x1p-48;
     if (pair->tangent >= 0) {
         if (far < pair->tangent) rho = far;
         else if (near <= pair->tangent) return pair->wide;
-    } else if (near < 0x1p-7) return 1; /* the disc holds the centre, or nearly so */
-    double q = ((e - (b - rho)) * (e + (b - rho)) + 0x1p-48) / (4 * rho * b) * (1 + 0x1p-48);
+    } else { /* the disc holds the centre, or nearly so */
+        if (near <= -pair->tangent) return 1;
+        rest = 0x1p-44 * e;
+    }
+    double q = ((e - (b - rho)) * (e + (b - rho)) + rest) / (4 * rho * b) * (1 + 0x1p-48);
     return half_angle(q, tolerance);
 }
 #endif

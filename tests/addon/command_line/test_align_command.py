@@ -40,3 +40,16 @@ def test_align_without_outputs_says_what_it_found(scans: Path, capsys: pytest.Ca
     assert "matched value" in out
     assert "search " in out  # the time of each stage
     assert listing(scans) == before
+
+
+def test_a_vertex_group_names_the_piece_that_is_matched(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report_file = scans / "report.json"
+    pair = scans / "source.blend", scans / "target.obj"
+    status, _, err = run(capsys, "align", *pair, "--source-cut", "Right", "--report", report_file, *QUICK)
+    assert status == 0
+    assert "cut to a piece of 5" in err
+    assert "of its area, as asked; the rest has no counterpart" in err
+    assert 0.45 < json.loads(report_file.read_text())["cut_to"]["source"] < 0.55
+    status, _, err = run(capsys, "align", *pair, "--source-cut", "Left", *QUICK)
+    assert status == 1
+    assert "has no vertex group and no attribute of single numbers named 'Left'" in err

@@ -93,7 +93,7 @@ def test_landmarks_join_the_search():
 def test_closed_and_open_do_not_go_together():
     mesh = ball(600, name="egg")
     opened = TriangleMesh(mesh.vertices, mesh.faces[30:], "bowl")
-    with pytest.raises(MeshError, match="'egg' is closed and 'bowl' is not"):
+    with pytest.raises(MeshError, match="'egg' is closed"):
         align(mesh, opened, AlignSettings(samples=20, targets=100, fill_holes=True))
 
 

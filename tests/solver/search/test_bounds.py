@@ -93,6 +93,22 @@ def test_bound_of_a_point_is_the_value(seed):
     assert (bounds <= best_rotations(grown(problem, 1 + 1e-6), z)[0]).all()
 
 
+@pytest.mark.parametrize("size", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_bounds_of_small_discs_around_the_centre_tend_to_the_value(size):
+    """As where a pocket is crowded in the disc: a search of whole heads could not end for them."""
+    rng = np.random.default_rng(7)
+    target = size * disc_points(rng, 40)
+    problem = matching(
+        size * disc_points(rng, 12), target, np.abs(target) * rng.uniform(0.9, 1.1, 40), weights=rng.random((12, 40))
+    )
+    grid = 2.0**-36
+    z = size * disc_points(rng, 300)
+    z = (np.floor(z.real / grid) + 0.5) * grid + 1j * (np.floor(z.imag / grid) + 0.5) * grid
+    bounds = bound_cells(problem, z, np.full(300, grid / 2))
+    loose = bounds > best_rotations(problem, z)[0]
+    assert loose.mean() < 0.02  # an edge may be as near by chance
+
+
 @settings(max_examples=25, deadline=None)
 @given(SEEDS)
 def test_best_rotation_against_the_slow_reference(seed):

@@ -1,148 +1,13 @@
-"""Options that operators and the scene's settings share, each defined once."""
+"""Options of a transfer, named as in `attributes.TransferSettings`."""
 
 # no postponed annotations here: Blender reads the properties from them
-from collections.abc import Callable
 from typing import Any
 
 import bpy
-import numpy as np
 
-from ..solver import AlignSettings
-from .attributes import KINDS, Mask, TransferSettings, mask_names, split_names
-from .computation import Repair, selected_loop
-from .mesh_data import Surface, foreach
-
-_DEFAULTS = AlignSettings()
-
-
-class ScanOptions:
-    """Mixin with what to do about a scan's flaws; see `computation.Repair`."""
-
-    fill_holes: bpy.props.BoolProperty(
-        name="Fill Holes",
-        description="Close openings, such as a mouth, all but the outer one, and cut small handles, for the "
-        "computation. The mesh itself stays as it is",
-        default=True,
-    )
-    outer_loop: bpy.props.EnumProperty(
-        name="Outer Boundary",
-        description="Which boundary loop becomes the rim of the disc, where Fill Holes finds several",
-        items=(
-            ("longest", "Longest", "The longest boundary loop"),
-            ("selected", "Selected", "The boundary loop that has selected vertices, as chosen in Edit Mode"),
-        ),
-        default="longest",
-    )
-    largest_part: bpy.props.BoolProperty(
-        name="Largest Part",
-        description="Leave all separate parts but the one of largest area out of the computation",
-        default=True,
-    )
-
-
-SCAN_OPTIONS = tuple(ScanOptions.__annotations__)
-
-
-def repair(options: Any) -> Repair:
-    """Return what to do about a scan's flaws from an object that has `ScanOptions`."""
-    return Repair(options.fill_holes, options.largest_part)
-
-
-def outer_vertex(obj: bpy.types.Object, surface: Surface, options: Any) -> int | None:
-    """Return a vertex of the boundary loop that is chosen as the outer one, None for the longest.
-
-    Raises
-    ------
-    Refusal
-        As `computation.selected_loop`.
-    """
-    if not options.fill_holes or options.outer_loop == "longest":
-        return None
-    selected = foreach(obj.data.vertices, "select", 1, np.bool_)
-    return selected_loop(surface.mesh, selected, repair(options), surface.keys)
-
-
-class AlignOptions:
-    """Mixin with the options of an alignment, named as in `solver.AlignSettings`, and where landmarks come from."""
-
-    reflect: bpy.props.EnumProperty(
-        name="Mirrored",
-        description="Whether the target may be the mirror image of the source",
-        items=(
-            ("auto", "Detect", "Search both ways; the mirrored one is taken only if it wins clearly"),
-            ("never", "No", "Left is left on both"),
-            ("always", "Yes", "The target is the mirror image of the source, like a left and a right tooth"),
-        ),
-        default=_DEFAULTS.reflect,
-    )
-    refine: bpy.props.EnumProperty(
-        name="Refinement",
-        description="How the map that the search proved best is improved",
-        items=(
-            ("dense", "Dense", "The target is then bent onto the source, without folds: the most accurate"),
-            ("mobius", "Möbius", "The best conformal map nearby, tuned on all vertices"),
-            ("none", "None", "Exactly the map of the certificate"),
-        ),
-        default=_DEFAULTS.refine,
-    )
-    landmarks: bpy.props.EnumProperty(
-        name="Landmarks",
-        description="Pairs of points that are known; a few wrong ones do no harm",
-        items=(
-            ("none", "None", "The surfaces alone decide"),
-            ("empties", "Empties", "Empties parented to source and target, with equal names but for .001 at the end"),
-            ("groups", "Vertex Groups", "Vertex groups of equal names with a single vertex on either mesh"),
-        ),
-        default="none",
-    )
-    samples: bpy.props.IntProperty(
-        name="Samples",
-        description="Points of the source that the search matches; more are slower and tell more places apart",
-        default=_DEFAULTS.samples,
-        min=3,
-        soft_min=20,
-        soft_max=400,
-    )
-    targets: bpy.props.IntProperty(
-        name="Target Points",
-        description="Points that stand for the target in the search; more are slower and more accurate",
-        default=_DEFAULTS.targets,
-        min=3,
-        soft_min=200,
-        soft_max=5000,
-    )
-    radius: bpy.props.FloatProperty(
-        name="Match Radius",
-        description="How near matched points have to be, as hyperbolic distance in the disc; "
-        "0: as far as the target points lie from each other",
-        default=_DEFAULTS.radius or 0.0,
-        min=0.0,
-        max=0.9,
-        precision=3,
-    )
-    z_max: bpy.props.FloatProperty(
-        name="Search Range",
-        description="How far apart the centres of the two discs may lie; what is proved is proved for this range",
-        default=_DEFAULTS.z_max,
-        min=0.01,
-        max=0.999,
-        precision=3,
-    )
-
-
-ALIGN_OPTIONS = tuple(AlignOptions.__annotations__)
-
-
-def align_settings(
-    options: Any, time_limit: float, outer: tuple[int | None, int | None] = (None, None)
-) -> AlignSettings:
-    """Return the solver's settings from an object that has `AlignOptions` and `ScanOptions`.
-
-    A radius or time limit of 0 is none; `outer` are vertices on the outer loops of source and target.
-    """
-    chosen = {name: getattr(options, name) for name in ALIGN_OPTIONS if name != "landmarks"}
-    chosen |= {"radius": options.radius or None, "time_limit": time_limit or None}
-    return AlignSettings(**chosen, fill_holes=options.fill_holes, source_outer=outer[0], target_outer=outer[1])
+from ..attributes import KINDS, Mask, TransferSettings, split_names
+from ..textures.settings import SIZES, TextureSettings
+from .names import nameable
 
 
 def enum_identifier(kind: str) -> str:
@@ -150,17 +15,8 @@ def enum_identifier(kind: str) -> str:
     return kind.upper().replace("-", "_")
 
 
-def _nameable(role: str) -> Callable[[Any, bpy.types.Context, str], list[str]]:
-    """Return what suggests names for a mask of the scene's source or target."""
-
-    def suggest(_owner: Any, context: bpy.types.Context, _typed: str) -> list[str]:
-        obj = getattr(context.scene.mobius, role)
-        return [] if obj is None or obj.type != "MESH" else mask_names(obj)
-
-    return suggest
-
-
 _TRANSFER = TransferSettings()
+_TEXTURES = TextureSettings()
 _MASK_ITEMS = (
     ("none", "Everything", "Every vertex takes part"),
     ("selected", "Selection", "Vertices that are selected, as chosen in Edit Mode"),
@@ -177,7 +33,7 @@ class SourceMaskOptions:
     source_mask_name: bpy.props.StringProperty(
         name="Source Mask",
         description="Vertex group or attribute of the source; what has at least half of the full weight gives",
-        search=_nameable("source"),
+        search=nameable("source"),
         search_options={"SUGGESTION"},
     )
     source_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the source gives")
@@ -279,7 +135,7 @@ class TransferOptions(SourceMaskOptions):
         name="Target Mask",
         description="Vertex group or attribute of the target; what can be mixed is mixed by it, anything else is "
         "carried to where it is at least half",
-        search=_nameable("target"),
+        search=nameable("target"),
         search_options={"SUGGESTION"},
     )
     target_mask_invert: bpy.props.BoolProperty(name="Invert", description="All but that part of the target receives")
@@ -295,43 +151,66 @@ class TransferOptions(SourceMaskOptions):
         ),
         default=_TRANSFER.unmatched,
     )  # fmt: skip
+    keys_by: bpy.props.EnumProperty(
+        name="Fit",
+        description="How shape keys get the directions and proportions of the target",
+        items=(
+            ("gradients", "Whole Shape", "What is stretched or turned on the source is so on the target; the rest "
+             "follows smoothly"),
+            ("frames", "Each Vertex", "Each vertex moves as the surface right around it is turned and scaled"),
+        ),
+        default=_TRANSFER.keys_by,
+    )  # fmt: skip
     evaluated: bpy.props.BoolProperty(
         name="Evaluated Source",
         description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
         "original mesh. Shape keys are the original's",
         default=_TRANSFER.evaluated,
     )
+    texture_size: bpy.props.IntProperty(
+        name="Size",
+        description="Side of the pictures in texels; 0: as many as the source has on the part that the target shows",
+        default=_TEXTURES.size,
+        min=0,
+        soft_max=8192,
+        max=SIZES[1],
+    )
+    texture_layout: bpy.props.EnumProperty(
+        name="Layout",
+        description="Which UV map the pictures are for",
+        items=(
+            ("auto", "Automatic", "The target's own if it has one, else the source's, else the disc"),
+            ("own", "Own", "The UV map that the target is rendered with"),
+            ("carried", "Carried", "The source's, carried over"),
+            ("disc", "Disc", "The conformal map of the target to a disc"),
+        ),
+        default=_TEXTURES.layout,
+    )
+    texture_margin: bpy.props.IntProperty(
+        name="Margin",
+        description="Texels added around islands; -1: a 256th of the size",
+        default=_TEXTURES.margin,
+        min=-1,
+        soft_max=64,
+    )
+    texture_result: bpy.props.EnumProperty(
+        name="Result",
+        description="What becomes of the pictures",
+        items=(
+            ("pictures", "Pictures", "Pictures in a new material, packed into the file"),
+            ("attributes", "Color Attributes", "What they show at the target's vertices"),
+        ),
+        default=_TEXTURES.result,
+    )
+    texture_mask: bpy.props.BoolProperty(
+        name="Mask of Unmatched",
+        description="A further picture, white where the target has no certain counterpart",
+        default=_TEXTURES.mask,
+    )
 
 
 SOURCE_MASK_OPTIONS = tuple(SourceMaskOptions.__annotations__)
 TRANSFER_OPTIONS = (*SOURCE_MASK_OPTIONS, *TransferOptions.__annotations__)
-
-
-def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
-    """Draw what of the chosen kinds is carried, how it joins what is there, and where."""
-    column = layout.column()
-    column.prop(options, "layers")
-    if options.layers == "named":
-        column.prop(options, "layer_names")
-    column.prop(options, "collisions")
-    column = layout.column()
-    column.prop(options, "mix")
-    column.prop(options, "mix_factor", text="Factor")
-    column = layout.column()
-    for role in ("source_mask", "target_mask"):
-        row = column.row(align=True)
-        row.prop(options, role)
-        if getattr(options, role) != "none":
-            row.prop(options, f"{role}_invert", text="", icon="ARROW_LEFTRIGHT")
-        if getattr(options, role) == "named":
-            column.prop(options, f"{role}_name", text=" ")
-    column.prop(options, "unmatched")
-    column = layout.column(heading="Vertex Groups")
-    column.prop(options, "deform_only")
-    column.prop(options, "normalize")
-    column.prop(options, "limit")
-    column.prop(options, "smallest_weight")
-    layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
 
 
 def source_mask(options: Any) -> Mask:
@@ -344,7 +223,16 @@ def transfer_settings(options: Any) -> TransferSettings:
     kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
     receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
     own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
-    own += ("unmatched", "evaluated")
+    own += ("unmatched", "keys_by", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
-    return TransferSettings(kinds=kinds, names=names, **masks, **{name: getattr(options, name) for name in own})
+    textures = TextureSettings(
+        max(options.texture_size, SIZES[0]) if options.texture_size else 0,
+        options.texture_layout,
+        options.texture_margin,
+        options.texture_result,
+        options.texture_mask,
+    )
+    return TransferSettings(
+        kinds=kinds, names=names, textures=textures, **masks, **{name: getattr(options, name) for name in own}
+    )

@@ -1,0 +1,55 @@
+"""What the colors in the viewport mean."""
+
+from __future__ import annotations
+
+import bpy
+import gpu
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from gpu_extras.batch import batch_for_shader
+
+from .. import stored_alignment
+from ..heat_maps import MAP_MEASURES, Measure, measure, shown_by
+from .drawing import floats, free_corner, opaque, write
+
+
+def legends(context: bpy.types.Context) -> list[Measure]:
+    """Return what needs a legend in this 3D viewport: colors that are shown, and lines that are drawn."""
+    view = context.window_manager.mobius_view
+    found: list[Measure] = []
+    shading = context.space_data.shading
+    if view.legend and (shading.type not in ("WIREFRAME", "SOLID") or shading.color_type == "VERTEX"):
+        for obj in (context.object, context.scene.mobius.target):
+            if obj is not None and obj.type == "MESH":
+                shown = shown_by(obj.data.attributes.active_color_name or "")
+                found += [shown] if shown and shown not in found else []
+    confidence = measure("confidence", MAP_MEASURES)
+    if view.matches and confidence not in found and stored_alignment.pair(context):
+        found.append(confidence)
+    return found
+
+
+def draw_legends() -> None:
+    """Draw the legends that this viewport needs, one over the other."""
+    context = bpy.context
+    if not context.space_data.overlay.show_overlays:
+        return
+    scale = context.preferences.system.ui_scale
+    left, bottom = free_corner(context)
+    for shown in legends(context):
+        _draw_legend(shown, left, bottom, scale)
+        bottom += 64 * scale
+
+
+def _draw_legend(shown: Measure, left: float, bottom: float, scale: float) -> None:
+    """Draw a bar of the scale's colors, what it shows above, its values below; the corner is in pixels."""
+    width, height, line = 180 * scale, 12 * scale, 16 * scale
+    x = np.repeat(left + np.linspace(0, width, len(shown.stops)), 2)
+    y = np.tile([bottom + line, bottom + line + height], len(shown.stops))
+    corners = np.column_stack([x, y, np.zeros(len(x))])
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    color = opaque(np.repeat(shown.stops, 2, axis=0), 1.0)
+    batch_for_shader(shader, "TRI_STRIP", {"pos": floats(corners), "color": floats(color)}).draw(shader)
+    write(iface_(shown.title), left, bottom + line + height + 5 * scale)
+    for share, tick in zip(np.linspace(0, 1, len(shown.ticks)), shown.ticks, strict=True):
+        write(tick, left + share * width, bottom, at=share)

@@ -1,0 +1,74 @@
+"""The panel's top: two meshes and the button that aligns them, or the work under way."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from .. import topology_cache
+from ..jobs import Job, MOBIUS_OT_stop, describe_proof
+from ..operators.align import MOBIUS_OT_align
+from ..operators.check import MOBIUS_OT_check
+from ..operators.swap import MOBIUS_OT_swap
+from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
+from ..preferences import preferences
+from ..usable import why_not
+from .place import MobiusPanel, draw_sentence, hand_on
+
+
+class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
+    """Choose two meshes and align them."""
+
+    bl_label = "Möbius"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout, settings = self.layout, context.scene.mobius
+        _draw_picker(layout, context, "source")
+        row = layout.row()
+        row.alignment = "CENTER"
+        row.operator(MOBIUS_OT_swap.bl_idname, text="Swap", icon="FILE_REFRESH")
+        _draw_picker(layout, context, "target")
+        layout.separator()
+        if Job.current is not None:
+            _draw_job(layout, Job.current)
+        else:
+            column = layout.column()
+            column.scale_y = 1.4
+            button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
+            hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
+
+
+def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: str) -> None:
+    """Draw the choice of a mesh, and under it what that mesh is, with a button that selects what is wrong with it."""
+    settings = context.scene.mobius
+    obj = getattr(settings, role)
+    column = layout.column(align=True)
+    column.label(text=iface_("Source") if role == "source" else iface_("Target"), translate=False)
+    column.prop(settings, role, text="", icon="OUTLINER_OB_MESH")
+    if obj is None:
+        return
+    if reason := why_not(obj, f"{role} mesh", context.scene, writes=False):
+        draw_sentence(column, reason, "ERROR")
+        return
+    kept = preferences(context)
+    if kept is not None and not kept.check_while_drawing:
+        line = topology_cache.Line((iface_("{:,} vertices").format(len(obj.data.vertices)),), None, True)
+    else:
+        line = topology_cache.line_of(obj, repair(settings))
+    icon = {True: "CHECKMARK", False: "ERROR", None: "QUESTION"}[line.is_disc]
+    row = column.row(align=True)
+    texts = row.column(align=True)
+    for number, text in enumerate(line.rows):
+        texts.label(text=text, icon="BLANK1" if number else icon, translate=False)
+    if line.selectable:
+        button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
+        button.object_name, button.edit = obj.name, True
+
+
+def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
+    """Draw how far the work under way is, and what it has proved."""
+    row = layout.row(align=True)
+    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
+    row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
+    layout.label(text=job.waits or describe_proof(job.progress) or iface_("ESC stops"), translate=False)

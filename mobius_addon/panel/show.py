@@ -1,0 +1,51 @@
+"""Pictures of what the alignment is worth, and what takes them away."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import stored_alignment
+from ..heat_maps import MAP_MEASURES
+from ..operators.clear import MOBIUS_OT_clear
+from ..operators.discs import MOBIUS_OT_show_discs
+from ..operators.heat_map import MOBIUS_OT_heat_map
+from ..operators.side_by_side import MOBIUS_OT_end_side_by_side, MOBIUS_OT_side_by_side, is_shown
+from .place import MobiusSubPanel
+
+
+class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
+    """See what the alignment is worth."""
+
+    bl_label = "Show"
+    bl_order = 2
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where there is an alignment."""
+        return stored_alignment.pair(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the switches and buttons."""
+        layout, view = self.layout, context.window_manager.mobius_view
+        column = layout.column()
+        column.prop(view, "matches")
+        if view.matches:
+            row = column.row(align=True)
+            row.prop(view, "count")
+            row.prop(view, "lines", slider=True)
+        column = layout.column(align=True)
+        if is_shown(context):
+            column.operator(MOBIUS_OT_end_side_by_side.bl_idname, icon="LOOP_BACK", depress=True)
+        else:
+            column.operator(MOBIUS_OT_side_by_side.bl_idname, icon="MOD_MIRROR")
+        if view.discs:
+            column.prop(view, "discs", text="Discs in UV Editor", icon="UV", toggle=True)
+        else:
+            column.operator(MOBIUS_OT_show_discs.bl_idname, icon="UV")
+        column = layout.column(align=True)
+        column.label(text="Heat Map on Target")
+        row = column.row(align=True)
+        for measure in MAP_MEASURES:
+            row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
+        layout.prop(view, "legend")
+        layout.operator(MOBIUS_OT_clear.bl_idname, icon="TRASH")

@@ -1,0 +1,159 @@
+"""A piece cut out of a surface that no disc carries as a whole, as a head out of a body: the one that the other shows.
+
+On the disc of a whole body most of the skin shrinks to nothing, and a closed surface has no disc at all. What sticks
+out of it is cut off where the loop around is shortest, each such piece is tried beside the other surface, and the one
+that fits takes the place of the whole; the rest has no counterpart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..flatten.distortion import signed_areas
+from ..flatten.flatten import Flattening
+from ..stages import Part
+from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
+from ..surface.necks import Neck, necks
+from .dense import drafted_from
+from .mobius_map import roughly_aligned
+from .prepared import Surface
+from .reconsider import UNLIKE, unlike
+from .settings import AlignSettings
+
+SHRUNK, MUCH = 1e-6, 0.25
+"""A surface is too deep for a disc where this share of its area shrinks there to less than this, beside the average: of
+bodies with a hole in the foot or the crown 0.5 to 0.8 does, of hands, the deepest that are aligned well whole, 0.13."""
+
+TRIED = 4
+"""Pieces that are tried beside the other surface, those most alike in their distances first: of two heads beside a body
+the right one came first and second. If none fits, as many that are cut beside the shortest loops."""
+
+CLOSED = "is closed"
+"""Why a surface has no disc."""
+
+PAIRS = 20_000
+"""Pairs of points whose distances tell the shape of a piece: their quantiles are known to 0.4 % of the range."""
+
+
+def fitting_pieces(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part
+) -> tuple[Surface, Surface, tuple[str, ...]]:
+    """Return the surfaces, of one that no disc carries the piece that fits the other, and what is to be said of that.
+
+    Raises
+    ------
+    MeshError
+        A surface cannot be used as a whole, and has no piece that fits.
+    """
+    clock.begin("flatten source", "Flattening the source", 0.0)
+    first = _why_cut(source)
+    clock.begin("flatten target", "Flattening the target", 0.3)
+    second = _why_cut(target)
+    if not settings.cut or (first is None) == (
+        second is None
+    ):  # neither, or none that tells which piece of the other is shown
+        return source, target, ()
+    rest = clock.part(0.6, 1.0, "cut")
+    if first is not None:
+        found, said = _piece_like(source, target, first, settings, rest, is_source=True)
+        return found or source, target, said
+    found, said = _piece_like(target, source, str(second), settings, rest, is_source=False)
+    return source, found or target, said
+
+
+def _why_cut(surface: Surface) -> str | None:
+    """Return why a disc cannot carry the surface as a whole, as the rest of a sentence; None if it can."""
+    if (surface.cleaned.mesh.twins >= 0).all():
+        return CLOSED
+    try:
+        share = shrunk(surface.flattening)
+    except MeshError:
+        return "is too deep or narrow for one disc"
+    if share > MUCH:
+        return f"is too deep for one disc, where {share:.0%} of it would shrink by more than a million"
+    return None
+
+
+def shrunk(flattening: Flattening) -> float:
+    """Return the share of a surface's area that is smaller in the disc than `SHRUNK` times what it would be evenly."""
+    mesh = flattening.mesh
+    scale = signed_areas(flattening.disc, mesh.faces) / np.maximum(mesh.face_areas, np.finfo(float).tiny)
+    return float(mesh.face_areas[scale < SHRUNK * np.pi / mesh.area].sum() / mesh.area)
+
+
+def _piece_like(
+    whole: Surface, other: Surface, reason: str, settings: AlignSettings, clock: Part, *, is_source: bool
+) -> tuple[Surface | None, tuple[str, ...]]:
+    """Return the piece of a surface that is most like the other one, and what is to be said of it.
+
+    None where no piece is, and a disc carries the whole, if badly.
+    """
+    name = whole.original.name
+    clock.begin("cut", "Looking where to cut", 0.0)
+    mesh = whole.cleaned.mesh
+    hanging = necks(mesh, _width(other.flattening))
+    pieces = sorted(hanging, key=lambda neck: _shape_difference(_submesh(mesh, neck), other.mesh))
+    best: tuple[bool, float, Surface, Neck] | None = None
+    for shortest, stage in ((True, clock.part(0.1, 0.5)), (False, clock.part(0.5, 1.0))):
+        chosen = [neck for neck in pieces if neck.shortest is shortest][:TRIED]
+        for number, neck in enumerate(chosen):
+            said = f"cut where it is narrow, to a piece of {neck.share:.1%} of its area; the rest has no counterpart"
+            piece = whole.piece(neck.beyond, said)
+            part = stage.part(number / TRIED, (number + 1) / TRIED)
+            part.begin("cut", "Trying a piece", 0.0)
+            pair = (piece, other) if is_source else (other, piece)
+            try:
+                rough = roughly_aligned(*pair, replace(settings, take_rival=False), part.part(0.0, 0.7), None)
+            except MeshError:  # no disc either
+                continue
+            draft, _, there = drafted_from(rough, part.part(0.7, 1.0))
+            found = rough.mobius.reflected, unlike(rough, draft, there), piece, neck
+            # of a left and a right one the one that need not be mirrored
+            if found[1] <= UNLIKE and (best is None or found[:2] < best[:2]):
+                best = found
+        if best is not None:
+            break
+    if best is None and reason == CLOSED:
+        if not pieces:
+            raise MeshError(
+                f"'{name}' {CLOSED} (it has no boundary), and nothing hangs on it by a neck where it could be cut: "
+                "delete some faces to open it into a disc"
+            )
+        count = plural(sum(neck.shortest for neck in pieces), "piece")
+        raise MeshError(
+            f"'{name}' {CLOSED}, and of {count} that hang on it by a neck none fits '{other.original.name}': "
+            "cut out what is to be matched, or name a vertex group of it"
+        )
+    if best is None:
+        return None, ()
+    said = f"'{name}' {reason}: the piece that fits was found, {best[3].length:.3g} around where it was cut"
+    return best[2], (said,)
+
+
+def _width(flattening: Flattening) -> float:
+    """Return the squared length of a surface's rim over its area."""
+    rim = flattening.mesh.vertices[flattening.boundary]
+    length = np.sqrt(((rim - np.roll(rim, 1, axis=0)) ** 2).sum(axis=1)).sum()
+    return float(length**2 / flattening.mesh.area)
+
+
+def _submesh(mesh: TriangleMesh, neck: Neck) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices, mesh.faces[neck.beyond])
+
+
+def _shape_difference(one: TriangleMesh, other: TriangleMesh) -> float:
+    """Return by how much the distances between the points of two surfaces differ, in roots of their areas."""
+    return float(np.abs(_distances(one) - _distances(other)).mean())
+
+
+def _distances(mesh: TriangleMesh) -> Floats:
+    """Return the distances between random points of a surface, (PAIRS,), sorted, in roots of its area.
+
+    Osada et al., "Shape distributions" (2002), their D2.
+    """
+    rng = np.random.default_rng(0)
+    middle = mesh.vertices[mesh.faces].mean(axis=1)
+    one, two = rng.choice(len(middle), (2, PAIRS), p=mesh.face_areas / mesh.area)
+    return np.sort(np.sqrt(((middle[one] - middle[two]) ** 2).sum(axis=1) / mesh.area))

@@ -1,0 +1,95 @@
+"""One pair of prepared specimens: aligned, measured, and told in plain figures."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..align.alignment import Alignment
+from ..mobius import Mobius
+from .distance import EvenFlow, continuous_procrustes
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What is known of a pair.
+
+    Attributes
+    ----------
+    value, upper_bound : float
+        Q of the map, and what no other in its orientation exceeds.
+    certified : bool
+        Whether the two are the same, and this the map gone on with.
+    samples : int
+        What Q is at most.
+    z, theta, reflected : complex as (float, float), float, bool
+        The Möbius map from the source's disc to the target's.
+    mean_confidence : float
+        Where the map claims anything.
+    distance : float
+        Continuous Procrustes distance by this map.
+    dense : bool
+        Whether the map was bent beyond Möbius.
+    seconds : float
+        Of one processor.
+    warnings : tuple of str
+    """
+
+    value: float
+    upper_bound: float
+    certified: bool
+    samples: int
+    z: tuple[float, float]
+    theta: float
+    reflected: bool
+    mean_confidence: float
+    distance: float
+    dense: bool
+    seconds: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def mobius(self) -> Mobius:
+        """The Möbius map from the source's disc to the target's."""
+        return Mobius(complex(*self.z), self.theta, self.reflected)
+
+    @property
+    def cost(self) -> float:
+        """Share of the samples that did not match, in [0, 1]: what a spanning tree is minimal in."""
+        return 1 - self.value / self.samples
+
+    def plain(self) -> dict[str, Any]:
+        """Return the figures as JSON-ready data."""
+        return asdict(self)
+
+    @staticmethod
+    def read(data: dict[str, Any]) -> Figures:
+        """Return the figures from what `plain` gave."""
+        return Figures(**{**data, "z": tuple(data["z"]), "warnings": tuple(data["warnings"])})
+
+
+def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
+    """Return what is known of a pair that was aligned; `flow` is that of its source."""
+    decisive = alignment if alignment.overlap is None else alignment.overlap.alignment
+    mobius = alignment.mobius
+    distance = continuous_procrustes(
+        flow,
+        alignment.target,
+        alignment.located,
+        mirrored=mobius.reflected,
+        points=alignment.target_samples[: alignment.settings.targets],
+    )
+    return Figures(
+        value=alignment.value,
+        upper_bound=alignment.search.upper_bound,
+        certified=alignment.certified,
+        samples=len(alignment.source_samples),
+        z=(mobius.z.real, mobius.z.imag),
+        theta=mobius.theta,
+        reflected=mobius.reflected,
+        mean_confidence=alignment.mean_confidence,
+        distance=distance,
+        dense=decisive.bending is not None,
+        seconds=seconds,
+        warnings=alignment.warnings,
+    )

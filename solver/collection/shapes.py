@@ -1,0 +1,138 @@
+"""All specimens on one topology: the template's vertices, and landmarks, carried to each of them along its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
+from ..surface.nearest import SurfacePoints
+from .chart import Chart, Step, carried_along, mirrored
+from .collect import Collection
+from .cycles import step
+from .procrustes import Pose, generalised
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Specimens whose vertices correspond.
+
+    Attributes
+    ----------
+    names : list of str
+        The template's comes first.
+    faces : (m, 3) int
+        The template's, of its mesh in order.
+    vertices : (k, n, 3) float64
+        Of each, in its own pose and size; of the template those of its mesh.
+    mirrored : list of bool
+        Which are mirror images of the template.
+    areas : (n,) float64
+        Around the template's vertices: their weights in means and poses.
+    certainty : list of float
+        Mean confidences of the maps along each path, multiplied.
+    """
+
+    names: list[str]
+    faces: Integers
+    vertices: Floats
+    mirrored: list[bool]
+    areas: Floats
+    certainty: list[float]
+
+    @cached_property
+    def superimposed(self) -> tuple[Floats, list[Pose]]:
+        """The mean shape, (n, 3), as the template lies, and the pose that brings each specimen onto it."""
+        return generalised(self.vertices, self.areas, self.mirrored)
+
+    def mesh(self, number: int) -> TriangleMesh:
+        """Return a specimen with the template's triangles, in its own pose, turned round where it is mirrored."""
+        faces = self.faces[:, ::-1] if self.mirrored[number] else self.faces
+        return TriangleMesh(self.vertices[number], faces, self.names[number])
+
+
+def path_to(collection: Collection, start: int, end: int) -> list[Step]:
+    """Return the maps that lead from one specimen to another, by the root's paths to both.
+
+    Raises
+    ------
+    KeyError
+        No path leads there.
+    """
+    here, there = collection.routes[start], collection.routes[end]
+    common = 0
+    while common < min(len(here), len(there)) and here[common] == there[common]:
+        common += 1
+    walked = [*here[: common - 1 : -1], *there[common - 1 :]] if common else []
+    maps = collection.atlas
+    return [step(maps, a, b) for a, b in pairwise(walked)]
+
+
+def shapes(collection: Collection) -> Shapes:
+    """Return all specimens that the root's paths reach, on the root's topology."""
+    root = collection.root
+    template = collection.atlas.chart(root)
+    used = np.unique(template.faces)
+    faces = np.searchsorted(used, template.faces)
+    reached = [root, *(number for number in collection.routes if number != root)]
+    vertices = np.empty((len(reached), len(used), 3))
+    vertices[0] = template.vertices[used]
+    turned, certainty = [False], [1.0]
+    confidence = {edge: known.mean_confidence for edge, known in zip(collection.edges, collection.figures, strict=True)}
+    for row, number in enumerate(reached[1:], 1):
+        path = path_to(collection, root, number)
+        vertices[row] = path[-1].end.places(carried_along(template.disc[used], path))
+        turned.append(mirrored(path))
+        route = collection.routes[number]
+        edges = [(min(a, b), max(a, b)) for a, b in pairwise(route)]
+        certainty.append(float(np.prod([confidence[edge] for edge in edges])))
+    names = [collection.names[number] for number in reached]
+    return Shapes(names, faces, vertices, turned, template.areas[used], certainty)
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Landmarks on every specimen.
+
+    Attributes
+    ----------
+    labels : list of str
+    names : list of str
+        Of the specimens; first the one that they were placed on.
+    places : (k, l, 3) float64
+    off : (l,) float64
+        How far from the surface each was placed, in diagonals of the specimen.
+    """
+
+    labels: list[str]
+    names: list[str]
+    places: Floats
+    off: Floats
+
+
+def marks(collection: Collection, start: int, labels: list[str], given: Floats) -> Marks:
+    """Carry landmarks, (l, 3), from the specimen that they were placed on to all that can be reached.
+
+    Each stands for the nearest point of the surface.
+    """
+    chart = collection.atlas.chart(start)
+    at, off = on_surface(chart, given)
+    reached = [start, *(number for number in collection.routes if number != start)]
+    places = [chart.places(at)]
+    for number in reached[1:]:
+        path = path_to(collection, start, number)
+        places.append(path[-1].end.places(carried_along(at, path)))
+    return Marks(labels, [collection.names[number] for number in reached], np.stack(places), off / chart.diagonal)
+
+
+def on_surface(chart: Chart, points: Floats) -> tuple[Complexes, Floats]:
+    """Return where in the disc the nearest points of a surface are, (l,), and how far from it the given ones, (l,)."""
+    mesh = TriangleMesh(chart.vertices, chart.faces)
+    surface = SurfacePoints(mesh, (), 0.0)
+    face, weights = surface.nearest_point(points, np.zeros_like(points), 16)
+    corners = chart.faces[face]
+    nearest = np.einsum("qk,qkd->qd", weights, chart.vertices[corners])
+    return (weights * chart.disc[corners]).sum(axis=1), np.linalg.norm(nearest - points, axis=1)

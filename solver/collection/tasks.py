@@ -1,0 +1,152 @@
+"""What a process of its own does: prepare a specimen, or align a pair of prepared ones. All of it by files."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from multiprocessing import parent_process
+from pathlib import Path
+from typing import Any
+
+from ..align.pipeline import align
+from ..align.prepared import Surface, prepare
+from ..align.settings import AlignSettings
+from ..align.surface_file import load_surface, save_surface
+from ..carry.correspond import correspond
+from ..carry.map_file import save_map
+from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh
+from .distance import EvenFlow
+from .pair import figures
+
+KEPT = 24
+"""Prepared surfaces that a process keeps in memory: some 3 MB each, of 10,000 triangles."""
+
+Result = dict[str, Any]
+"""Plain data: what a task found, or "error", why it found nothing."""
+
+
+@dataclass(frozen=True)
+class Prepare:
+    """Put a mesh in order, flatten it, measure its curvature and choose its points; write that to `path`."""
+
+    name: str
+    vertices: Floats
+    faces: Integers
+    keys: Floats | None
+    settings: dict[str, Any]
+    largest_part: bool
+    path: str
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Align the prepared surfaces in two files; write the dense map to `map_path`, if it is given."""
+
+    source: str
+    target: str
+    settings: dict[str, Any]
+    map_path: str | None = None
+
+
+Task = Prepare | Compare
+
+
+def run(task: dict[str, Any]) -> Result:
+    """Do a task, given by its kind and its fields, and return plain data, whatever happens.
+
+    Nothing of this package crosses to another process: there it may have another name.
+    """
+    work = {
+        "prepare": lambda **given: _prepare(Prepare(**given)),
+        "compare": lambda **given: _compare(Compare(**given)),
+    }
+    try:
+        return work[task["kind"]](**task["given"])
+    except (MeshError, OSError, ValueError) as error:
+        return {"error": str(error) or type(error).__name__}
+    except MemoryError:
+        return {"error": "there is not enough memory for it"}
+    except Exception as error:  # a fault of the program: named, and the others go on
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return {"error": f"{type(error).__name__} in {Path(where.filename).name}, line {where.lineno}: {error}"}
+
+
+def plain(task: Task) -> dict[str, Any]:
+    """Return a task as what `run` takes."""
+    return {"kind": type(task).__name__.lower(), "given": dict(vars(task))}
+
+
+def begin() -> None:
+    """Begin a process for tasks: it ends with the one that began it, however that ends."""
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.join,), daemon=True).start()
+
+
+def _end_with(ended: Callable[[], object]) -> None:
+    ended()
+    os._exit(1)
+
+
+def _prepare(task: Prepare) -> Result:
+    begun = time.process_time()
+    mesh = TriangleMesh(task.vertices, task.faces, task.name)
+    surface = prepare(mesh, AlignSettings(**task.settings), largest_part=task.largest_part, keys=task.keys)
+    with whole_file(Path(task.path)) as path:
+        save_surface(path, surface)
+    return {
+        "fingerprint": mesh.fingerprint,
+        "notes": list(surface.notes),
+        "vertices": len(mesh.vertices),
+        "faces": len(mesh.faces),
+        "seconds": time.process_time() - begun,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """A prepared surface, and what is computed of it for any pair."""
+
+    surface: Surface
+
+    @cached_property
+    def flow(self) -> EvenFlow:
+        return EvenFlow(self.surface.flattening)
+
+
+@lru_cache(maxsize=KEPT)
+def _loaded(path: str, _changed: int) -> _Known:
+    return _Known(load_surface(path))
+
+
+def _known(path: str) -> _Known:
+    return _loaded(path, Path(path).stat().st_mtime_ns)
+
+
+def _compare(task: Compare) -> Result:
+    source, target = _known(task.source), _known(task.target)
+    begun = time.process_time()
+    alignment = align(source.surface, target.surface, AlignSettings(**task.settings))
+    if task.map_path is not None:
+        with whole_file(Path(task.map_path)) as path:
+            originals = source.surface.original, target.surface.original
+            save_map(path, alignment, correspond(alignment), *originals)
+    found = figures(alignment, source.flow, 0.0)
+    return {**found.plain(), "seconds": time.process_time() - begun}
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a path to write to, in the same folder, and move what was written to `path` at the end: all or nothing."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)

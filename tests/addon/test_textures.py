@@ -1,0 +1,342 @@
+"""Pictures of materials, carried to another mesh and read from what Blender then has."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import QUICK, corner_values, make_sheet
+
+bpy: Any = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
+
+from mobius_extension.mobius_addon.attributes import Carrier, TransferSettings, plan_transfer  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.textures.images import new_image, read_tiles  # noqa: E402
+from mobius_extension.mobius_addon.textures.settings import TextureSettings  # noqa: E402
+from mobius_extension.solver import Correspondence  # noqa: E402
+from mobius_extension.solver.flatten.locate import TriangulatedDisc  # noqa: E402
+
+SIZE = 128
+
+
+def flat_uv(obj: Any, scale: float = 0.5, offset: float = 0.5, name: str = "UVMap") -> None:
+    layer = obj.data.uv_layers.get(name) or obj.data.uv_layers.new(name=name)
+    flat = np.array([obj.data.vertices[loop.vertex_index].co[:2] for loop in obj.data.loops])
+    layer.uv.foreach_set("vector", (flat * scale + offset).astype(np.float32).ravel())
+
+
+def smooth(channels: int = 3, seed: int = 0, size: int = SIZE) -> np.ndarray:
+    """Bytes of waves of which the shortest has 16 texels."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:size, :size] / size
+    waves = [
+        sum(np.sin(2 * np.pi * (a * x + b * y) + c) for a, b, c in rng.uniform(-5, 5, (4, 3))) for _ in range(channels)
+    ]
+    values = np.stack(waves, axis=2)
+    return ((values - values.min()) / np.ptp(values) * 255).astype(np.uint8)
+
+
+def material(name: str, **pictures: Any) -> Any:
+    """A material whose shader's sockets read pictures: (image, output) or image."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    tree = made.node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    for socket, image in pictures.items():
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        end = shader.inputs[socket.replace("_", " ")]
+        if socket == "Normal":
+            between = tree.nodes.new("ShaderNodeNormalMap")
+            tree.links.new(between.outputs["Normal"], end)
+            end = between.inputs["Color"]
+        tree.links.new(node.outputs["Color"], end)
+    return made
+
+
+def carrier(source: Any, target: Any, **options: Any) -> Carrier:
+    surfaces = read_surface(source), read_surface(target)
+    plane = [surface.mesh.vertices[:, 0] + 1j * surface.mesh.vertices[:, 1] for surface in surfaces]
+    face, place = TriangulatedDisc.of(plane[0], surfaces[0].mesh.faces).locate(plane[1])
+    lost = options.pop("lost", np.zeros(len(face), bool))
+    face = np.where(lost, -1, face)
+    found = Correspondence(
+        face, np.where(lost[:, None], 0, place), ~lost, (~lost).astype(float), surfaces[0].mesh.faces, len(plane[0])
+    )
+    return Carrier(found, *surfaces, **options)
+
+
+def carry(source: Any, target: Any, way: Carrier | None = None, **chosen: Any) -> Any:
+    settings = TransferSettings(kinds=("textures",), textures=TextureSettings(**chosen))
+    plan = plan_transfer(source, target, way or carrier(source, target), settings)
+    plan.write(target)
+    return plan
+
+
+def shown(target: Any, label: str) -> np.ndarray:
+    """The pixels of the picture that the target's new material reads for a channel."""
+    found = next(
+        slot.material for slot in target.material_slots if slot.material and "mobius_textures" in slot.material
+    )
+    node = next(node for node in found.node_tree.nodes if node.label == label)
+    tiles = read_tiles(node.image)
+    return next(iter(tiles.values())) if list(tiles) == [1001] else tiles  # type: ignore[return-value]
+
+
+@pytest.fixture
+def sheets(empty_scene: Any) -> tuple[Any, Any]:
+    source, target = make_sheet("Source", 21), make_sheet("Target", 16)
+    flat_uv(source)
+    flat_uv(target, -0.5)  # turned by half
+    return source, target
+
+
+def close(found: np.ndarray, wanted: np.ndarray, most: float = 4.0) -> None:
+    # a target of other triangles reads places a fraction of a texel off
+    assert np.abs(found.astype(float) - wanted).mean() < most / 4
+    assert np.percentile(np.abs(found.astype(float) - wanted), 99) < most
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_blender_reads_the_bytes_that_are_written(empty_scene: Any, channels: int) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (131, 70, channels)).astype(np.uint8)
+    pixels[:, :, 3:] = np.maximum(pixels[:, :, 3:], 1)
+    found = read_tiles(new_image("Any", {1001: pixels}, "Non-Color"))[1001]
+    if channels == 4:
+        assert (found == pixels).all()
+    else:
+        assert (found[:, :, :3] == pixels).all()
+
+
+def test_base_color_arrives_turned_as_the_layout_is(sheets: tuple[Any, Any]) -> None:
+    source, target = sheets
+    picture = smooth()
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
+    plan = carry(source, target, size=SIZE)
+    assert plan.counts() == {"textures": 1}
+    assert plan.warnings == ()
+    close(shown(target, "Base Color")[:, :, :3], picture[::-1, ::-1])
+    made = target.material_slots[0].material
+    assert made.name == "Target Textures"
+    node = next(node for node in made.node_tree.nodes if node.type == "TEX_IMAGE")
+    assert node.image.colorspace_settings.name == "sRGB"
+    assert node.image.packed_file is not None
+    assert node.inputs["Vector"].links[0].from_node.uv_map == "UVMap"
+    # carried again, the first material and picture are gone
+    carry(source, target)
+    assert [slot.material.name for slot in target.material_slots] == ["Target Textures.001"]
+    assert len([x for x in bpy.data.images if "mobius_textures" in x]) == 1
+
+
+def test_every_channel_with_its_color_space_and_depth(sheets: tuple[Any, Any]) -> None:
+    source, target = sheets
+    names = {"Base Color": "sRGB", "Roughness": "Non-Color", "Metallic": "Non-Color", "Emission Color": "sRGB"}
+    pictures = {name: smooth(3, seed) for seed, name in enumerate(names)}
+    floats = (smooth(3, 9) / 100.0).astype(np.float32)  # beyond 1
+    images = {name: new_image(name, {1001: pictures[name]}, names[name]) for name in names}
+    images["Emission Color"] = new_image("Glow", {1001: floats}, "Linear Rec.709")
+    source.data.materials.append(material("All", **{name.replace(" ", "_"): images[name] for name in names}))
+    assert carry(source, target, size=SIZE).counts() == {"textures": 4}
+    for label in ("Base Color", "Roughness", "Metallic"):
+        close(shown(target, label)[:, :, :3], pictures[label][::-1, ::-1])
+    glow = shown(target, "Emission")
+    assert glow.dtype == np.float32
+    close(100 * glow[:, :, :3], 100 * floats[::-1, ::-1])
+
+
+def test_packed_channels_and_alpha(sheets: tuple[Any, Any]) -> None:
+    """Occlusion, roughness and metallic in one picture, as glTF has them, and a color with alpha."""
+    source, target = sheets
+    color, packed = smooth(4, 1), smooth(3, 2)
+    made = material("Packed", Base_Color=new_image("Color", {1001: color}, "sRGB"))
+    tree = made.node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    read, split = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeSeparateColor")
+    read.image = new_image("Packed", {1001: packed}, "Non-Color")
+    tree.links.new(read.outputs["Color"], split.inputs["Color"])
+    tree.links.new(split.outputs["Green"], shader.inputs["Roughness"])
+    tree.links.new(split.outputs["Blue"], shader.inputs["Metallic"])
+    first = next(node for node in tree.nodes if node.type == "TEX_IMAGE" and node.image.name == "Color")
+    tree.links.new(first.outputs["Alpha"], shader.inputs["Alpha"])
+    source.data.materials.append(made)
+    plan = carry(source, target, size=SIZE)
+    assert plan.warnings == ()
+    close(shown(target, "Base Color"), color[::-1, ::-1])
+    close(shown(target, "Roughness")[:, :, 0], packed[::-1, ::-1, 1])
+    close(shown(target, "Metallic")[:, :, 0], packed[::-1, ::-1, 2])
+    new = target.material_slots[0].material.node_tree
+    assert (
+        next(n for n in new.nodes if n.type == "BSDF_PRINCIPLED").inputs["Alpha"].links[0].from_socket.name == "Alpha"
+    )
+
+
+def test_several_materials_and_tiles_become_one(sheets: tuple[Any, Any]) -> None:
+    source, target = sheets
+    left, right = smooth(3, 3), smooth(3, 4)
+    source.data.materials.append(material("Left", Base_Color=new_image("L", {1001: left}, "sRGB")))
+    source.data.materials.append(material("Right", Base_Color=new_image("R", {1001: left, 1002: right}, "sRGB")))
+    uv = source.data.uv_layers["UVMap"].uv
+    for polygon in source.data.polygons:
+        if polygon.center.x > 0:
+            polygon.material_index = 1
+            for k in polygon.loop_indices:
+                uv[k].vector.x += 1
+    carry(source, target, size=SIZE)
+    found = shown(target, "Base Color")[::-1, ::-1, :3]
+    close(found[:, : SIZE // 2 - 1], left[:, : SIZE // 2 - 1])
+    close(found[:, SIZE // 2 + 1 :], right[:, SIZE // 2 + 1 :])
+
+
+def test_tiles_of_the_target(sheets: tuple[Any, Any]) -> None:
+    source, target = sheets
+    picture = smooth()
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
+    target = make_sheet("Wide", 17)
+    flat_uv(target, 1.0, 1.0)  # four tiles
+    carry(source, target, size=SIZE)
+    tiles: Any = shown(target, "Base Color")
+    assert sorted(tiles) == [1001, 1002, 1011, 1012]
+    large = np.repeat(np.repeat(picture[:64, 64:], 2, axis=0), 2, axis=1)
+    close(tiles[1002][2:-2, 2:-2, :3], large[2:-2, 2:-2], 24.0)  # twice as large, smoothly
+
+
+@pytest.mark.parametrize("layout", ["carried", "disc"])
+def test_a_target_without_a_layout_gets_one(sheets: tuple[Any, Any], layout: str) -> None:
+    source, target = sheets
+    picture = smooth()
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
+    if layout == "disc":
+        assert carry(source, target, layout=layout).textures.layout.name == "Disc"
+        assert [x.name for x in target.data.uv_layers] == ["UVMap", "Disc"]
+    target.data.uv_layers.remove(target.data.uv_layers["UVMap"])
+    if layout == "carried":
+        carry(source, target, size=SIZE)
+        close(shown(target, "Base Color")[:, :, :3], picture)
+    name = "UVMap" if layout == "carried" else "Disc"
+    uv = corner_values(target, name)
+    found = shown(target, "Base Color")
+    size = len(found)
+    inside = (uv * size).astype(int).clip(0, size - 1)
+    places = np.array([target.data.vertices[loop.vertex_index].co[:2] for loop in target.data.loops])
+    there = ((places / 2 + 0.5) * SIZE).astype(int).clip(0, SIZE - 1)
+    error = found[inside[:, 1], inside[:, 0], :3].astype(float) - picture[there[:, 1], there[:, 0]]
+    assert np.abs(error).mean() < 12  # places rounded to texels, on waves of 16 texels
+
+
+def test_a_scan_with_colors_and_no_material_gets_a_picture_and_back(sheets: tuple[Any, Any]) -> None:
+    source, target = sheets
+    layer = source.data.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
+    place = np.array([vertex.co[:] for vertex in source.data.vertices])
+    color = np.ones((len(place), 4), np.float32)
+    color[:, :3] = (place + 1) / 2
+    layer.data.foreach_set("color", color.ravel())
+    source.data.attributes.default_color_name = "Col"
+    carry(source, target, size=SIZE)
+    found = shown(target, "Base Color")[:, :, 0] / 255
+    linear = np.where(found <= 0.04045, found / 12.92, ((found + 0.055) / 1.055) ** 2.4)
+    assert np.abs(linear - (1 - (np.arange(SIZE) + 0.5) / SIZE)).max() < 0.01
+    # and the picture as colors of a third mesh
+    third = make_sheet("Third", 12)
+    carry(target, third, carrier(target, third), result="attributes")
+    values = np.array([x.color[0] for x in third.data.color_attributes["Base Color"].data])
+    expected = [(third.data.vertices[loop.vertex_index].co.x + 1) / 2 for loop in third.data.loops]
+    assert np.abs(values - expected).max() < 0.02
+
+
+def test_flat_normals_stay_flat_and_mirrored_ones_are_mirrored(sheets: tuple[Any, Any]) -> None:
+    """A normal map of slopes along x: on a target whose layout is turned and mirrored they still point along x."""
+    source, target = sheets
+    tilt = np.zeros((SIZE, SIZE, 3), np.uint8)
+    tilt[:] = np.round(255 * (np.array([0.6, 0, 0.8]) / 2 + 0.5))
+    source.data.materials.append(material("Bumps", Normal=new_image("N", {1001: tilt}, "Non-Color")))
+    uv = target.data.uv_layers["UVMap"].uv
+    for (scale_x, scale_y), swap, wanted in (
+        ((0.5, 0.5), False, (0.6, 0)),
+        ((-0.5, -0.5), False, (-0.6, 0)),
+        ((-0.5, 0.5), False, (-0.6, 0)),
+        ((0.5, -0.5), True, (0, -0.6)),
+    ):
+        flat = np.array([target.data.vertices[loop.vertex_index].co[:2] for loop in target.data.loops])
+        flat = flat[:, ::-1] if swap else flat
+        uv.foreach_set("vector", (flat * [scale_x, scale_y] + 0.5).astype(np.float32).ravel())
+        carry(source, target, size=SIZE)
+        found = 2 * (shown(target, "Normal")[:, :, :3].astype(float) / 255) - 1
+        # tangents follow the bumps of the sheet
+        assert np.abs(found[..., :2].mean(axis=(0, 1)) - wanted).max() < 0.03
+        assert np.abs(found[..., 2] - 0.8).max() < 0.02
+        node = next(n for n in target.material_slots[0].material.node_tree.nodes if n.type == "NORMAL_MAP")
+        assert node.uv_map == "UVMap"
+
+
+@pytest.mark.parametrize("gap", ["leave", "nearest", "fill"])
+def test_what_has_no_counterpart(sheets: tuple[Any, Any], gap: Any) -> None:
+    source, target = sheets
+    white = np.full((SIZE, SIZE, 3), 255, np.uint8)
+    source.data.materials.append(material("White", Base_Color=new_image("W", {1001: white}, "sRGB")))
+    lost = np.array([vertex.co.x > 0.5 for vertex in target.data.vertices])
+    carry(source, target, carrier(source, target, lost=lost, gap=gap), size=SIZE, mask=True)
+    found = shown(target, "Base Color")
+    mask = next(iter(read_tiles(bpy.data.images["Target Unmatched"]).values()))[:, :, 0]
+    assert mask[:, :20].min() == 255  # the layout is turned
+    assert mask[:, 40:].max() == 0
+    if gap == "leave":
+        assert found[:, :20, 3].max() == 0
+        assert found[:, 40:, 3].min() == 255
+    else:
+        assert found[:, :, :3].min() >= 254
+
+
+def test_bad_input_is_a_sentence(sheets: tuple[Any, Any], tmp_path: Path) -> None:
+    source, target = sheets
+    with pytest.raises(Refusal, match="'Source' has no textures to transfer"):
+        carry(source, target)
+    made = material("Skin", Base_Color=new_image("Skin", {1001: smooth()}, "sRGB"))
+    source.data.materials.append(made)
+    flat_uv(target, 1.0)
+    with pytest.raises(Refusal, match=r"The UV map 'UVMap' of 'Target' has .* faces across the border of a tile"):
+        carry(source, target)
+    flat_uv(target, 0.5, -0.5)
+    with pytest.raises(Refusal, match="outside of all tiles"):
+        carry(source, target)
+    flat_uv(target)
+    for polygon in target.data.polygons:
+        for k in polygon.loop_indices:
+            uv = target.data.uv_layers["UVMap"].uv[k].vector
+            uv.x = abs(uv.x - 0.5)
+    assert any("overlap in its UV map" in warning for warning in carry(source, target).warnings)
+    node = next(node for node in made.node_tree.nodes if node.type == "TEX_IMAGE")
+    node.image = bpy.data.images.new("Gone", 4, 4)
+    node.image.source = "FILE"
+    node.image.filepath = str(tmp_path / "gone.png")
+    with pytest.raises(Refusal, match="The picture 'Gone' is missing or cannot be read"):
+        carry(source, target)
+    source.data.uv_layers.remove(source.data.uv_layers["UVMap"])
+    with pytest.raises(Refusal, match="'Source' has no UV map, which the picture 'Gone'"):
+        carry(source, target)
+
+
+def test_a_failure_leaves_nothing_behind(sheets: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    source, target = sheets
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: smooth()}, "sRGB")))
+    target.data.uv_layers.remove(target.data.uv_layers["UVMap"])
+    before = len(bpy.data.images), len(bpy.data.materials)
+    from mobius_extension.mobius_addon.textures import writing
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("disk full")
+
+    monkeypatch.setattr(writing, "_assign", fail)
+    with pytest.raises(RuntimeError, match="disk full"):
+        carry(source, target)
+    assert (len(bpy.data.images), len(bpy.data.materials)) == before
+    assert not target.data.uv_layers
+    assert not target.material_slots
+
+
+def test_the_operator_carries_pictures(pair: tuple[Any, Any]) -> None:
+    source, target = pair
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: smooth()}, "sRGB")))
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}) == {"FINISHED"}
+    assert shown(target, "Base Color").shape[2] == 4
+    assert [x.name for x in target.data.uv_layers if x.active_render] == ["UVMap"]

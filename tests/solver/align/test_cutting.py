@@ -1,0 +1,94 @@
+"""Bodies beside heads: the head is cut out, and the rest has no counterpart."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import revolved, snowman
+from scans import bumps, percent, places, posed, remeshed
+
+from solver import AlignSettings, MeshError, TriangleMesh, align, cleaned, correspond, prepare, report
+from solver.align.cutting import MUCH, shrunk
+from solver.flatten.flatten import flatten
+
+SMALL = AlignSettings(samples=60, targets=400, reflect="never")
+
+
+def head_of(body: TriangleMesh, lowest: float = 0.6) -> TriangleMesh:
+    """What of a body lies above its neck."""
+    return TriangleMesh(body.vertices, body.faces[body.vertices[body.faces][:, :, 2].min(axis=1) > lowest], "Head")
+
+
+@pytest.fixture(scope="module")
+def pair() -> tuple[TriangleMesh, TriangleMesh, np.ndarray]:
+    """A body, its head remeshed in another pose, and the body's vertex of each of the head's."""
+    body = snowman(seed=3)
+    part = head_of(body)
+    used = np.unique(part.faces)
+    alone = TriangleMesh(body.vertices[used], np.searchsorted(used, part.faces), "Head")
+    head, kept = remeshed(posed(alone, 1), 0.7, 2)
+    return body, head, used[kept]
+
+
+def test_the_head_is_found_on_a_closed_body(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
+    body, head, _ = pair
+    alignment = align(head, body, SMALL)
+    found = correspond(alignment)
+    assert any(said.startswith("'Body' is closed: the piece that fits was found") for said in alignment.warnings)
+    above, below = body.vertices[:, 2] > 0.8, body.vertices[:, 2] < 0.2
+    assert found.matched[above].mean() > 0.9
+    assert not found.matched[below].any()
+    assert (found.face[below] == -1).all()
+    there = above & found.matched
+    assert percent(places(found, head)[there], posed(body, 1).vertices[there], head).mean() < 1.5
+    figures = report(alignment, found)
+    assert figures["coverage"] == pytest.approx(body.vertex_areas[found.matched].sum() / body.area, abs=0.01)
+
+
+def test_the_body_may_be_the_source(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
+    body, head, vertex = pair
+    found = correspond(align(body, head, SMALL))
+    assert found.source_size == len(body.vertices)
+    assert percent(places(found, body)[found.matched], body.vertices[vertex[found.matched]], head_of(body)).mean() < 1.5
+    assert found.matched.mean() > 0.85
+
+
+def test_a_vertex_group_says_where_to_cut(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
+    body, head, _ = pair
+    cut = prepare(body, SMALL, within=body.vertices[:, 2] > 0.6)
+    alignment = align(head, cut, SMALL)
+    assert any("cut to a piece of" in said and "as asked" in said for said in alignment.warnings)
+    found = correspond(alignment)
+    assert found.matched[body.vertices[:, 2] > 0.8].mean() > 0.9
+    assert not found.matched[body.vertices[:, 2] < 0.55].any()
+    with pytest.raises(MeshError, match="no face among the vertices"):
+        prepare(body, SMALL, within=np.zeros(len(body.vertices), bool))
+
+
+def test_a_person_does_not_go_to_one_disc(data_path: Callable[[str], Path]) -> None:
+    """A disc by its topology once the sole of a foot is open, and nearly all of it shrinks to nothing."""
+    data = np.load(data_path("heads/mpfb_man_body.npz"))
+    corner = data["corner"].reshape(-1, 4)
+    skin = corner[data["part"] == data["part"][0]]
+    faces = np.concatenate([skin[:, [0, 1, 2]], skin[:, [0, 2, 3]]])
+    opened = faces[data["vertices"][faces][:, :, 1].mean(axis=1) > -8.1]
+    tidy = cleaned(TriangleMesh(data["vertices"], opened, "Man"), largest_part=True, fill_holes=True)
+    assert shrunk(flatten(tidy.mesh, fill_holes=True)) > 2 * MUCH
+
+
+def test_a_head_goes_to_one_disc(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
+    assert shrunk(flatten(pair[1])) < 0.1 * MUCH
+
+
+def test_what_does_not_fit_is_refused(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
+    body, head, _ = pair
+    with pytest.raises(MeshError, match=r"^'Body' is closed, and of 2 pieces .* none fits 'bumps'"):
+        align(bumps(700, seed=3), body, SMALL)
+    turn = np.linspace(0, np.pi, 24)
+    ball = revolved(-np.cos(turn), np.sin(turn), 24)
+    with pytest.raises(MeshError, match=r"^'Body' is closed .*nothing hangs on it by a neck"):
+        align(head, ball, SMALL)
+    with pytest.raises(MeshError, match="is closed"):
+        align(head, body, replace(SMALL, cut=False))
