@@ -74,6 +74,8 @@ def _line(surface: Surface, repair: Repair) -> Line:
     if refused:  # such as a band with one side only
         return Line(refused, False)
     mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
+    if not found.boundary_loops:
+        return Line((iface_("closed, {:,} vertices").format(found.vertices), *mended), True, bool(changes))
     if openings := len(found.boundary_loops) - 1:
         loops = iface_("{:,} boundary loops:").format(openings + 1)
         return Line((loops, iface_("{:,} will be filled").format(openings), *mended), True, True)
@@ -87,7 +89,6 @@ def _problem(found: Topology, repair: Repair) -> tuple[str, str] | None:
         (len(found.non_manifold_edges), n_("{:,} edges with over 2 faces:"), n_("delete the extra faces")),
         (len(found.non_manifold_vertices), n_("{:,} points where parts touch:"), n_("split them")),
         (found.parts if found.parts > 1 else 0, n_("{:,} separate parts:"), n_("keep one, or turn on Largest Part")),
-        (int(not loops), n_("closed surface:"), n_("cut it first")),
         (0 if repair.fill_holes else len(loops[1:]), n_("{:,} openings:"), n_("turn on Fill Holes")),
         (found.handles, n_("{:,} handles, as of a cup:"), n_("cut through them and fill")),
     ):

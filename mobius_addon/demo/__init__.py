@@ -163,7 +163,7 @@ def discs(alignment: solver.Alignment, source: bpy.types.Object, target: bpy.typ
     """Return what the picture of the discs shows: the source's disc carried to the target's, and that one."""
     painted = paint_material(FACE_PAINT, GRID_UV, lit=False)
     surface = alignment.source.mesh
-    carried, still = alignment.mobius(alignment.source.disc), alignment.target.disc
+    carried, still = alignment.mobius(alignment.source.places), alignment.target.places
     # both turned alike, so that the source's face looks out of its disc upright
     seen = surface.vertices[:, 0] + 1j * surface.vertices[:, 2]
     turn = np.exp(1j * np.angle(np.sum(surface.vertex_areas * seen * np.conj(carried))))

@@ -178,23 +178,29 @@ def write_alignment(
     alignment: solver.Alignment,
     correspondence: solver.Correspondence,
     surfaces: Any,
-    frame: solver.Mobius | None = None,
+    frame: solver.Mobius | solver.SphereMobius | None = None,
 ) -> None:
     """Write the shared UV layout, the colors and the groups of matched points on both meshes.
 
     `frame` carries the source's disc to where the layout shows it; by default to the target's.
     """
-    frame = frame or alignment.mobius
-    carried, still = frame(alignment.source.disc), frame(alignment.carried)
+    shown: Any = frame or alignment.mobius
+    carried: Any = shown(alignment.source.places)
+    still: Any = shown(alignment.carried)
     here, there = (
         tidy or solver.Cleaned.unchanged(surface.mesh)
         for tidy, surface in zip((alignment.source_cleaned, alignment.target_cleaned), surfaces, strict=True)
     )
-    results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
-    results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
-    carried = here.at_vertices(carried, np.nan)
-    used = np.isfinite(carried)
-    color = results.disc_color(np.where(used, carried, 0))
+    if alignment.source.domain.closed:  # no layout without a seam: the colors are where points lie on the sphere
+        places = here.at_vertices(carried, np.nan)
+        used = np.isfinite(places).all(axis=1)
+        color = np.column_stack([0.5 + 0.5 * np.nan_to_num(places), np.ones(len(places))])
+    else:
+        results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
+        results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
+        carried = here.at_vertices(carried, np.nan)
+        used = np.isfinite(carried)
+        color = results.disc_color(np.where(used, carried, 0))
     results.write_color(source, SHARED_COLOR, color, used)
     results.write_color(target, SHARED_COLOR, solver.interpolate(correspondence, color), correspondence.face >= 0)
     matched = np.where(correspondence.matched, correspondence.confidence, 0.0)
@@ -249,6 +255,8 @@ def _proof(alignment: solver.Alignment) -> str:
         proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more{among}"
     elif alignment.taken is not None:
         proof = f"not the best match: another map has {search.value:.2f}"
+    elif isinstance(search, solver.SphereSearchResult):
+        proof = f"proved: {search.proved}" + ("; no rotation matches more" if search.rotations_certified else "")
     else:
         proof = f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
     return f"matched value {alignment.value:.2f} of at most {len(alignment.source_samples)}, {proof}"

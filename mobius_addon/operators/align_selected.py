@@ -117,7 +117,9 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
             surfaces = self._surface, target.surface
             with restored_on_failure(source), restored_on_failure(obj):
                 # in the source's own disc, which is the same for all of them
-                write_alignment(source, obj, done.alignment, done.correspondence, surfaces, frame=solver.Mobius())
+                write_alignment(
+                    source, obj, done.alignment, done.correspondence, surfaces, frame=type(done.alignment.mobius)()
+                )
                 stored_alignment.store(obj, source, done.alignment, done.correspondence, surfaces)
             written += 1
             for warning in filter(None, (unseen_warning(obj), *done.alignment.warnings)):

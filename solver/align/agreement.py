@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..flatten.distortion import log_conformal_factor
-from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc
-from ..mobius import Mobius
-from ..surface.mesh import Complexes, Floats, Integers
+from ..flatten.sphere import Flat
+from ..mobius import Mobius, SphereMobius
+from ..surface.mesh import Floats, Integers, Places
 from ..surface.statistics import weighted_median
 
 STRETCH = 0.3
@@ -17,7 +16,7 @@ pairs of faces and teeth that show the same piece it is 0.05 to 0.25."""
 
 
 def descriptor_distance(
-    source: Flattening, source_descriptors: Floats, target_descriptors: Floats, face: Integers, barycentric: Floats
+    source: Flat, source_descriptors: Floats, target_descriptors: Floats, face: Integers, barycentric: Floats
 ) -> Floats:
     """Return the distance, (q,), of descriptors of target points, (q, d), from those at points of the source."""
     there = np.einsum("qk,qkd->qd", barycentric, source_descriptors[source.mesh.faces[face]])
@@ -25,28 +24,28 @@ def descriptor_distance(
 
 
 def log_stretch(
-    source: Flattening, target: Flattening, carried: Complexes, face: Integers, barycentric: Floats, used: Integers
+    source: Flat, target: Flat, carried: Places, face: Integers, barycentric: Floats, used: Integers
 ) -> Floats:
     """Return the log of length on the source over length on the target around target vertices `used`, (q,).
 
     Parameters
     ----------
-    source, target : Flattening
+    source, target : Flat
     carried : (n,) complex128
         Where each target vertex goes in the source's disc.
     face, barycentric : (q,) int, (q, 3) float64
         The same for `used`, in the source's triangles.
     used : (q,) int
     """
-    source_factor = log_conformal_factor(source.mesh, source.disc)
+    source_factor = log_conformal_factor(source.mesh, source.places)
     carried_factor = log_conformal_factor(target.mesh, carried)[used]
     return carried_factor - np.einsum("qk,qk->q", barycentric, source_factor[source.mesh.faces[face]])
 
 
 def trust(
-    mobius: Mobius,
-    source: Flattening,
-    target: Flattening,
+    mobius: Mobius | SphereMobius,
+    source: Flat,
+    target: Flat,
     source_descriptors: Floats,
     target_descriptors: Floats,
     scale: float,
@@ -60,20 +59,20 @@ def trust(
     ----------
     mobius : Mobius
         From the source's disc to the target's.
-    source, target : Flattening
+    source, target : Flat
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of the vertices.
     scale : float
         Standard deviation of the Gaussian that weighs their differences.
     """
-    used = np.flatnonzero(np.isfinite(target.disc.real))
-    carried = np.full(len(target.disc), complex(np.nan, np.nan))
-    carried[used] = mobius.inverse()(target.disc[used])
-    face, barycentric = TriangulatedDisc.of(source.disc, source.mesh.faces).locate(carried[used])
+    used = np.flatnonzero(target.mesh.used)
+    carried = target.domain.nowhere(len(target.places))
+    carried[used] = mobius.inverse()(target.places[used])
+    face, barycentric = source.domain.triangulated(source.places, source.mesh.faces).locate(carried[used])
     distance = descriptor_distance(source, source_descriptors, target_descriptors[used], face, barycentric)
     agreement = np.exp(-(distance**2) / (2 * scale**2))
     stretch = log_stretch(source, target, carried, face, barycentric, used)
     stretch -= weighted_median(stretch, agreement + 1e-9)
-    result = np.full(len(target.disc), 1e-3)
+    result = np.full(len(target.places), 1e-3)
     result[used] += (1 - 1e-3) * agreement * np.exp(-(stretch**2) / (2 * STRETCH**2))
     return result

@@ -8,13 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from ..bend.bend import Bending
-from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc
-from ..mobius import Mobius
+from ..flatten.sphere import Flat
+from ..mobius import Mobius, SphereMobius
 from ..search.branch_and_bound import SearchResult
 from ..search.matching import Objective
 from ..search.rival import Rival
-from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned
 from .confidence import evidence, probability, unmatched_share
 from .objective import usual_difference
@@ -33,7 +32,7 @@ class Alignment:
         Carries the source's disc to the target's.
     search : SearchResult
         The certified search that found it; `mobius` may be refined beyond `search.mobius`.
-    source, target : Flattening
+    source, target : Flat
     source_cleaned, target_cleaned : Cleaned or None
         How they were put in order for the computation, and how vertices and triangles relate to those of the meshes as
         they came; None if these were taken as they are. All else here is about vertices of the meshes in order.
@@ -68,10 +67,10 @@ class Alignment:
         Why the map is doubtful, if it is and that is known: kinds of `diagnosis.Cause`.
     """
 
-    mobius: Mobius
+    mobius: Mobius | SphereMobius
     search: SearchResult
-    source: Flattening
-    target: Flattening
+    source: Flat
+    target: Flat
     source_samples: Integers
     target_samples: Integers
     source_descriptors: Floats
@@ -138,18 +137,19 @@ class Alignment:
         )
 
     @cached_property
-    def carried(self) -> Complexes:
+    def carried(self) -> Places:
         """Where each target vertex goes in the source's disc, (n_target,); nan at vertices in no face."""
         if self.bending is not None:
             return self.bending.carried
         if self.overlap is not None:
-            places = np.full(len(self.target.disc), complex(np.nan, np.nan))
+            places = self.target.domain.nowhere(len(self.target.places))
             face, barycentric = self.located
             has = np.flatnonzero(face >= 0)
-            places[has] = (self.source.disc[self.source.mesh.faces[face[has]]] * barycentric[has]).sum(axis=1)
+            corners = self.source.mesh.faces[face[has]]
+            places[has] = self.source.domain.mean(self.source.places, corners, barycentric[has])
             return places
-        places = self.target.disc.copy()
-        used = np.isfinite(places.real)
+        places = self.target.places.copy()
+        used = self.target.mesh.used
         places[used] = self.mobius.inverse()(places[used])
         return places
 
@@ -173,11 +173,11 @@ class Alignment:
 
         0 at vertices in no face, and at those that were found to have no counterpart.
         """
-        result = np.zeros(len(self.target.disc))
+        result = np.zeros(len(self.target.places))
         if self.overlap is not None:
             result[self.overlap.target.vertices] = self.overlap.alignment.confidence
         else:
-            used = np.isfinite(self.target.disc.real)
+            used = self.target.mesh.used
             result[used] = probability(self.evidence, bent=self.bending is not None)
         if self.counterpart is not None:
             result[~self.counterpart] = 0
@@ -187,7 +187,7 @@ class Alignment:
     def unfolded(self) -> float:
         """Share of the vertices that were moved so that no triangle is folded; 0 if nothing was bent."""
         bent = self if self.overlap is None else self.overlap.alignment
-        return 0.0 if bent.bending is None else bent.bending.repaired / len(bent.target.disc)
+        return 0.0 if bent.bending is None else bent.bending.repaired / len(bent.target.places)
 
     @property
     def mean_confidence(self) -> float:
@@ -201,16 +201,16 @@ class Alignment:
 
         -1 and 0 at vertices in no face. Target vertices beyond the source's boundary are at the nearest point of it.
         """
-        size = len(self.target.disc)
+        size = len(self.target.places)
         face, barycentric = np.full(size, -1), np.zeros((size, 3))
         if self.overlap is None:
-            used = np.flatnonzero(np.isfinite(self.target.disc.real))
-            disc = TriangulatedDisc.of(self.source.disc, self.source.mesh.faces)
+            used = np.flatnonzero(self.target.mesh.used)
+            disc = self.source.domain.triangulated(self.source.places, self.source.mesh.faces)
             face[used], barycentric[used] = disc.locate(self.carried[used])
             return face, barycentric
         parts = self.overlap
         inner, weights = parts.alignment.located
-        outside = np.setdiff1d(np.flatnonzero(np.isfinite(self.target.disc.real)), parts.target.vertices)
+        outside = np.setdiff1d(np.flatnonzero(self.target.mesh.used), parts.target.vertices)
         face[outside], barycentric[outside] = parts.nearest_face[outside], parts.nearest_barycentric[outside]
         face[parts.target.vertices] = parts.source.faces[inner]
         barycentric[parts.target.vertices] = weights

@@ -10,10 +10,9 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.special import expit
 
-from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc
-from ..mobius import Mobius
-from ..surface.mesh import Complexes, Floats, Integers
+from ..flatten.sphere import Flat
+from ..mobius import Mobius, SphereMobius
+from ..surface.mesh import Floats, Integers, Places
 from ..surface.statistics import weighted_median
 from .agreement import descriptor_distance, log_stretch
 
@@ -58,14 +57,14 @@ def probability(seen: Floats, *, bent: bool) -> Floats:
 
 
 def evidence(
-    source: Flattening,
-    target: Flattening,
+    source: Flat,
+    target: Flat,
     source_descriptors: Floats,
     target_descriptors: Floats,
     located: tuple[Integers, Floats],
-    carried: Complexes,
+    carried: Places,
     unmatched: float,
-    bending: tuple[Mobius, Floats, float] | None,
+    bending: tuple[Mobius | SphereMobius, Floats, float] | None,
 ) -> Floats:
     """Return what speaks against a map at each target vertex in use, (q, 8), columns as in `COLUMNS`.
 
@@ -77,7 +76,7 @@ def evidence(
 
     Parameters
     ----------
-    source, target : Flattening
+    source, target : Flat
     source_descriptors, target_descriptors : (n, d) float64
     located : (n_target,) int, (n_target, 3) float64
         The source's face, and where in it, of each target vertex.
@@ -88,7 +87,7 @@ def evidence(
     bending : Mobius, (n_target,) float64 and float, or None
         What was bent, how far above the source each vertex stayed, and the share of them that the unfolding moved.
     """
-    used = np.flatnonzero(np.isfinite(target.disc.real))
+    used = np.flatnonzero(target.mesh.used)
     face, barycentric = located[0][used], located[1][used]
     root = np.sqrt(source.mesh.area)
     distance = descriptor_distance(source, source_descriptors, target_descriptors[used], face, barycentric) / np.sqrt(
@@ -98,13 +97,15 @@ def evidence(
     stretch -= weighted_median(stretch, target.mesh.vertex_areas[used])
     vertices, faces = source.mesh.vertices, source.mesh.faces
     places = np.einsum("qk,qkd->qd", barycentric, vertices[faces[face]])
-    rim = vertices[np.concatenate([source.boundary, *source.holes])]
-    near = np.exp(-KDTree(rim).query(places)[0] / root / NEAR_RIM)
+    near = np.zeros(len(used))
+    if source.loops:
+        rim = vertices[np.concatenate(source.loops)]
+        near = np.exp(-KDTree(rim).query(places)[0] / root / NEAR_RIM)
     moved, offset, unfolded = np.zeros(len(used)), np.zeros(len(used)), 0.0
     if bending is not None:
         mobius, above, unfolded = bending
-        start = mobius.inverse()(target.disc[used])
-        there, weights = TriangulatedDisc.of(source.disc, faces).locate(start)
+        start = mobius.inverse()(target.places[used])
+        there, weights = source.domain.triangulated(source.places, faces).locate(start)
         moved = np.linalg.norm(np.einsum("qk,qkd->qd", weights, vertices[faces[there]]) - places, axis=1) / root
         offset = above[used]
     return np.stack(

@@ -1,7 +1,7 @@
 """A piece cut out of a surface that no disc carries as a whole, as a head out of a body: the one that the other shows.
 
-On the disc of a whole body most of the skin shrinks to nothing, and a closed surface has no disc at all. What sticks
-out of it is cut off where the loop around is shortest, each such piece is tried beside the other surface, and the one
+On the disc of a whole body most of the skin shrinks to nothing, and a closed surface beside an open one has no disc at
+all (two closed ones go to the sphere). What sticks out of it is cut off where the loop around is shortest, each such piece is tried beside the other surface, and the one
 that fits takes the place of the whole; the rest has no counterpart.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
 from ..surface.necks import Neck, necks
@@ -32,7 +33,7 @@ TRIED = 4
 the right one came first and second. If none fits, as many that are cut beside the shortest loops."""
 
 CLOSED = "is closed"
-"""Why a surface has no disc."""
+"""Why a surface beside an open one has no disc."""
 
 PAIRS = 20_000
 """Pairs of points whose distances tell the shape of a piece: their quantiles are known to 0.4 % of the range."""
@@ -48,6 +49,8 @@ def fitting_pieces(
     MeshError
         A surface cannot be used as a whole, and has no piece that fits.
     """
+    if all((surface.cleaned.mesh.twins >= 0).all() for surface in (source, target)):
+        return source, target, ()  # the sphere takes both, or says why not
     clock.begin("flatten source", "Flattening the source", 0.0)
     first = _why_cut(source)
     clock.begin("flatten target", "Flattening the target", 0.3)
@@ -78,9 +81,14 @@ def _why_cut(surface: Surface) -> str | None:
     return None
 
 
-def shrunk(flattening: Flattening) -> float:
-    """Return the share of a surface's area that is smaller in the disc than `SHRUNK` times what it would be evenly."""
+def shrunk(flattening: Flat) -> float:
+    """Return the share of a surface's area that is smaller in the disc than `SHRUNK` times what it would be evenly.
+
+    0 on the sphere, which refuses by itself what has no room there.
+    """
     mesh = flattening.mesh
+    if not isinstance(flattening, Flattening):
+        return 0.0
     scale = signed_areas(flattening.disc, mesh.faces) / np.maximum(mesh.face_areas, np.finfo(float).tiny)
     return float(mesh.face_areas[scale < SHRUNK * np.pi / mesh.area].sum() / mesh.area)
 
@@ -134,7 +142,7 @@ def _piece_like(
     return best[2], (said,)
 
 
-def _width(flattening: Flattening) -> float:
+def _width(flattening: Flat) -> float:
     """Return the squared length of a surface's rim over its area."""
     rim = flattening.mesh.vertices[flattening.boundary]
     length = np.sqrt(((rim - np.roll(rim, 1, axis=0)) ** 2).sum(axis=1)).sum()

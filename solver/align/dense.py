@@ -8,7 +8,7 @@ import numpy as np
 
 from ..bend.bend import ROUNDS, Draft, drafted, finished
 from ..flatten.distortion import signed_areas
-from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, Integers
 from .agreement import trust
@@ -84,7 +84,7 @@ def bent_densely(
     # what the whole discs left open the pieces may decide
     warnings = tuple(said for said in warnings if not said.startswith("ambiguous: "))
     warnings += tuple(f"in the overlap: {said}" for said in overlap.alignment.warnings)
-    counterpart = np.zeros(len(target.disc), bool)
+    counterpart = np.zeros(len(target.places), bool)
     counterpart[overlap.target.vertices] = overlap.alignment.counterpart
     found = replace(found, overlap=overlap, warnings=warnings)
     # straight sides may cross the jags of a cut, though none is turned over in the piece's own disc
@@ -93,7 +93,7 @@ def bent_densely(
     return replace(found, counterpart=counterpart)
 
 
-def left_out(source: Flattening, target: Flattening, here: Booleans, there: Booleans) -> tuple[float, float]:
+def left_out(source: Flat, target: Flat, here: Booleans, there: Booleans) -> tuple[float, float]:
     """Return the shares of the surfaces' areas around vertices that are not `here`, and not `there`."""
     first, second = (
         float(surface.mesh.vertex_areas[~kept].sum() / surface.mesh.area)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,8 +13,11 @@ from ..bend.bend import Draft, facing
 from ..bend.coarse import coarse
 from ..bend.moments import posed
 from ..bend.pose import FAR, misfit
+from ..mobius import Mobius, SphereMobius
+from ..search.matching import Objective
 from ..search.outcome import SearchResult
-from ..search.rival import scored
+from ..search.rival import Rival, scored
+from ..search.sphere_rival import scored_on_sphere
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
@@ -55,7 +59,7 @@ def _other_side(matched: Alignment, other: SearchResult) -> Alignment:
 
 def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]:
     """Yield so many further maxima of a search, each far from those before, as some thousand cells show them."""
-    known = [matched.search.mobius]
+    known: list[Any] = [matched.search.mobius]
     for number in range(count):
         part = clock.part(number / count, (number + 1) / count)
         part.begin("reconsider", "Trying the next best map", 0.0)
@@ -92,22 +96,27 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
     if reflected != matched.mobius.reflected:
         assert matched.other is not None
         found = _other_side(matched, matched.other)
-    used = np.flatnonzero(np.isfinite(target.disc.real))
+    used = np.flatnonzero(target.mesh.used)
     face, barycentric = onto.nearest_point(start[used], TriangleMesh(start, faces).vertex_normals()[used])
     corners = onto.mesh.faces[face]
     near = np.linalg.norm(np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners]) - start[used], axis=1) < FAR
-    there = (found.source.disc[corners] * barycentric).sum(axis=1)
-    weights = target.mesh.vertex_areas[used] * near * (np.abs(there) < 1 - 1e-6)
-    mobius = implied(there, target.disc[used], weights, reflected)
+    there = found.source.domain.mean(found.source.places, corners, barycentric)
+    weights = target.mesh.vertex_areas[used] * near * (found.source.domain.depth(there) > 1e-6)
+    mobius = implied(there, target.places[used], weights, reflected)
     found = improved(replace(found, mobius=mobius), found.difference)
     return Hypothesis(
-        replace(found, taken=scored(found.objective, found.mobius)), start, "one that a rigid pose implies"
+        replace(found, taken=_scored(found.objective, found.mobius)), start, "one that a rigid pose implies"
     )
+
+
+def _scored(objective: Objective, mobius: Mobius | SphereMobius) -> Rival:
+    """Return a transformation with its Q."""
+    return scored(objective, mobius) if isinstance(mobius, Mobius) else scored_on_sphere(objective, mobius)
 
 
 def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
     """Return by how much descriptors differ on average, in the draft, where it finds a counterpart; inf if nowhere."""
-    used = np.flatnonzero(there & np.isfinite(found.target.disc.real))
+    used = np.flatnonzero(there & found.target.mesh.used)
     if len(used) == 0:
         return np.inf
     face, barycentric = draft.located(found.target)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Integers, MeshError
 from .alignment import Alignment
@@ -31,6 +31,8 @@ def turned_round(
     Doubtful is also one that leaves much of the target without a counterpart. Its samples have to match better by
     `AlignSettings.reflect_margin`, before it is bent, and more of its map has to be sure than of the other, after.
     """
+    if found.source.domain.closed:  # it has an outside by itself: see `Surface.cleaned`
+        return None
     if found.mean_confidence > DOUBTFUL and _sure(found) > MOSTLY:
         return None
     part = clock.part(0.0, 0.5, "inside out")
@@ -61,7 +63,7 @@ def _sure(found: Alignment) -> float:
     return float(found.confidence @ found.target.mesh.vertex_areas / found.target.mesh.area)
 
 
-def _bulge(flattening: Flattening) -> float:
+def _bulge(flattening: Flat) -> float:
     """Return the volume between a surface and the cone over its rim; negative where it bulges inwards."""
     mesh = flattening.mesh
     corners = mesh.vertices[mesh.faces] - mesh.vertices[flattening.boundary].mean(axis=0)

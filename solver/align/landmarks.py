@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..flatten.flatten import Flattening
-from ..surface.mesh import Complexes, Floats, Integers, plural
+from ..flatten.sphere import Flat
+from ..surface.mesh import Booleans, Floats, Integers, Places, plural
 from ..surface.tidy import Cleaned
 
 REACH = 0.1
@@ -37,19 +37,26 @@ def own_landmarks(pairs: npt.ArrayLike | None, source: Cleaned, target: Cleaned)
     return np.stack(columns, axis=1).astype(np.intp)
 
 
-def usable_landmarks(given: Integers | None, source: Flattening, target: Flattening) -> tuple[Integers, list[str]]:
+def usable_landmarks(given: Integers | None, source: Flat, target: Flat) -> tuple[Integers, list[str]]:
     """Return the (source vertex, target vertex) rows that can be used, (l, 2), and warnings about the others."""
     if given is None or given.size == 0:
         return np.empty((0, 2), np.intp), []
     # nan compares false, so loose vertices drop out here too
-    inside = (np.abs(source.disc[given[:, 0]]) < 1 - 1e-9) & (np.abs(target.disc[given[:, 1]]) < 1 - 1e-9)
+    inside = _inside(source, given[:, 0]) & _inside(target, given[:, 1])
     left_out = int((~inside).sum())
     warnings = [f"{plural(left_out, 'landmark')} on a boundary or in no face left out"] if left_out else []
     return given[inside], warnings
 
 
+def _inside(surface: Flat, vertices: Integers) -> Booleans:
+    """Return which vertices are in use and on no outer boundary."""
+    if surface.domain.closed:
+        return surface.mesh.used[vertices]
+    return np.abs(surface.places[vertices]) < 1 - 1e-9
+
+
 def with_landmarks(
-    pairs: Integers, source: Complexes, target: Complexes, radius: Floats, weights: Floats
+    pairs: Integers, source: Places, target: Places, radius: Floats, weights: Floats
 ) -> tuple[Integers, Floats, Floats]:
     """Return the rows of `pairs` that join the source's points, (c,), and radii and weights with the landmarks in them.
 

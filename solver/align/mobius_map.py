@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from ..mobius import Mobius
+from ..flatten.sphere import Flat
+from ..mobius import Mobius, SphereMobius
 from ..search.branch_and_bound import SearchResult, search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
 from ..search.rival import Rival, best_rival
+from ..search.sphere_rival import best_sphere_rival
+from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
-from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.mesh import Floats, Integers, MeshError, Places
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility, covering_radius
 from .prepared import Surface
 from .refine import refined
 from .settings import AlignSettings
+from .sphere_map import searched_sphere
 
 
 def roughly_aligned(
@@ -45,6 +51,7 @@ def searched(
     source = source_surface.flattening
     clock.begin("flatten target", "Flattening the target", 0.1)
     target = target_surface.flattening
+    _require_alike(source, target)
     clock.begin("descriptors", "Measuring curvature", 0.2)
     source_descriptors = source_surface.descriptors(clock.within(0.2, 0.25))
     target_descriptors = target_surface.descriptors(clock.within(0.25, 0.3))
@@ -52,9 +59,9 @@ def searched(
     source_samples = source_surface.source_points(settings.samples)
     target_samples = target_surface.target_points(settings.targets, clock.within(0.3, 0.4))
     problem = Objective(
-        source.disc[source_samples],
-        target.disc[target_samples],
-        covering_radius(target.disc[target_samples])
+        source.places[source_samples],
+        target.places[target_samples],
+        covering_radius(target.places[target_samples])
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
@@ -64,8 +71,10 @@ def searched(
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
         target_samples = np.concatenate([target_samples, pairs[:, 1]])
-        problem = Objective(source.disc[source_samples], target.disc[target_samples], radius, weights)
-    found, other, said = _both_sides(problem, settings, clock)
+        problem = Objective(source.places[source_samples], target.places[target_samples], radius, weights)
+    search_all = searched_sphere if source.domain.closed else _both_sides
+    found, other, said = search_all(problem, settings, clock)
+    said += unproved(found)
     return Alignment(
         mobius=found.mobius,
         search=found,
@@ -102,16 +111,33 @@ def challenged(alignment: Alignment, clock: Part) -> Alignment:
     return taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
 
 
+def _require_alike(source: Flat, target: Flat) -> None:
+    """Raise `MeshError` if one of the surfaces is closed and the other is not."""
+    if source.domain.closed != target.domain.closed:
+        one, two = (source, target) if source.domain.closed else (target, source)
+        raise MeshError(
+            f"'{one.mesh.name}' is closed and '{two.mesh.name}' is not: cut the first open where the second is, or "
+            "close the second"
+        )
+
+
 def unproved(found: SearchResult) -> list[str]:
     """Say it if a search ran out of time before its proof."""
-    if found.certified:
+    if found.certified or isinstance(found, SphereSearchResult):  # which says itself what it has proved
         return []
     share = 100 * found.gap / max(found.upper_bound, 1e-300)
     return [f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"]
 
 
-def rival_of(found: Alignment, known: list[Mobius], enough: float | None, clock: Part) -> Rival:
+def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Part) -> Rival:
     """Look for the best transformation that maps everything elsewhere than those known."""
+    if found.source.domain.closed:
+        rival = best_sphere_rival(
+            found.objective, known, time_limit=found.settings.time_limit, progress=clock.searching(0.15)
+        )
+        if rival is None:
+            raise Cancelled
+        return rival
     rival = best_rival(
         found.objective,
         known,
@@ -138,8 +164,15 @@ def improved(found: Alignment, difference: float, tell: Callable[[float], None] 
     return replace(found, mobius=refined(found.mobius, found.source, found.target, *descriptors, difference, tell))
 
 
-def implied(source: Complexes, target: Complexes, weights: Floats, reflected: bool) -> Mobius:
-    """Return the transformation nearest to bringing points of the source's disc to the target's, (k,) each."""
+def implied(source: Places, target: Places, weights: Floats, reflected: bool) -> Mobius | SphereMobius:
+    """Return the transformation nearest to bringing points of the source's domain to the target's, (k,) or (k, 3) each.
+
+    On the sphere the nearest rotation: both are centred, so that a small step of all vertices leads on from there.
+    """
+    if source.ndim == 2:
+        seen = source * [1.0, -1.0, 1.0] if reflected else source
+        x, y, z, w = Rotation.align_vectors(target, seen, weights)[0].as_quat().tolist()
+        return SphereMobius((0.0, 0.0, 0.0), (w, x, y, z), reflected)
     return replace(algebraic_fit(np.conj(source) if reflected else source, target, weights), reflected=reflected)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat, SphereFlattening
 from ..mobius import hyperbolic_distance
-from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.sampling import HORIZON, extrema, farthest_points
 
 
@@ -33,23 +33,29 @@ def usual_difference(source: Floats, target: Floats) -> float:
     return max(float(np.median(np.linalg.norm(source - target, axis=1))), 0.1 * most)
 
 
-def covering_radius(points: Complexes) -> Floats:
-    """Return each point's pseudo-hyperbolic distance to its second nearest neighbour, (n,), at most 0.5.
+def covering_radius(points: Places) -> Floats:
+    """Return each point's distance to its second nearest neighbour, (n,), at most 0.5.
 
-    Discs of these radii around evenly spread points cover the region between them.
+    Discs of these radii around evenly spread points cover the region between them. In the disc, (n,), it is the
+    pseudo-hyperbolic distance; on the sphere, (n, 3), the chord.
     """
-    distance = hyperbolic_distance(points[:, None], points)
+    if points.ndim == 2:
+        distance = np.linalg.norm(points[:, None] - points, axis=2)
+    else:
+        distance = hyperbolic_distance(points[:, None], points)
     return np.clip(np.sort(distance, axis=1)[:, min(2, len(points) - 1)], 1e-6, 0.5)
 
 
-def interior(flattening: Flattening) -> Booleans:
+def interior(flattening: Flat) -> Booleans:
     """Return which vertices, (n,), are in use and far enough inside the disc for the search."""
+    if isinstance(flattening, SphereFlattening):
+        return flattening.mesh.used.copy()
     inside = np.isfinite(flattening.disc.real) & (np.abs(flattening.disc) < HORIZON)
     inside[flattening.boundary] = False
     return inside
 
 
-def source_points(flattening: Flattening, descriptors: Floats, count: int) -> Integers:
+def source_points(flattening: Flat, descriptors: Floats, count: int) -> Integers:
     """Return the source points: up to half of them extrema of curvature, the others far from these and each other."""
     inside = interior(flattening)
     peaks = extrema(flattening.mesh, descriptors[:, 1], inside)[: count // 2]

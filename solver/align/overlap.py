@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..bend.bend import Draft
 from ..bend.plate import RIM_REACH
-from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.topology import regions
@@ -25,12 +25,14 @@ BEYOND = 0.01
 
 
 def shared(
-    draft: Draft, source: Flattening, target: Flattening, progress: Callable[[float], None] | None = None
+    draft: Draft, source: Flat, target: Flat, progress: Callable[[float], None] | None = None
 ) -> tuple[Booleans, Booleans]:
     """Return which source vertices, (n_source,), and target vertices, (n_target,), have a counterpart in the other.
 
     `progress` is called with the share of the work done, in [0, 1], and may raise to end it.
     """
+    if not (source.loops or target.loops):
+        return np.ones(len(source.places), bool), np.ones(len(target.places), bool)
     tell = progress or (lambda _: None)
     places = draft.places()
     bent = TriangleMesh(places, draft.whole.faces)
@@ -96,7 +98,7 @@ class Piece:
     outer: int
 
 
-def piece(whole: Flattening, kept: Booleans) -> Piece | None:
+def piece(whole: Flat, kept: Booleans) -> Piece | None:
     """Return the disc that consists of about the faces between `kept` vertices, (n,); None where hardly any is left.
 
     The largest part of them, with what it encloses (openings of the surface stay open), less the corners by which parts

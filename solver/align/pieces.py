@@ -110,9 +110,9 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
     """
     place = np.searchsorted(source.faces, face)
     place = np.minimum(place, len(source.faces) - 1)
-    there = np.flatnonzero((source.faces[place] == face) & np.isfinite(inner.target.disc.real))
-    expected = (inner.source.disc[source.mesh.faces[place[there]]] * barycentric[there]).sum(axis=1)
-    disc = inner.target.disc[there]
+    there = np.flatnonzero((source.faces[place] == face) & np.isfinite(inner.target.places.real))
+    expected = (inner.source.places[source.mesh.faces[place[there]]] * barycentric[there]).sum(axis=1)
+    disc = inner.target.places[there]
     inside = (np.abs(expected) < 1 - 1e-6) & (np.abs(disc) < 1 - 1e-6)
     expected, disc = expected[inside], disc[inside]
     apart = hyperbolic_distance(inner.mobius.inverse()(disc), expected)

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..flatten.flatten import Flattening, flatten
+from ..flatten.flatten import flatten
+from ..flatten.sphere import Flat, flatten_sphere
 from ..stages import Progress, Stages
 from ..surface.cleaning import LEFT_OUT, cleaned
 from ..surface.descriptors import diffused_curvatures
@@ -21,6 +22,7 @@ from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
 from ..surface.tidy import Cleaned, piece_within
+from ..surface.topology import topology
 from ..surface.verdict import closing
 from .objective import interior, source_points
 from .settings import AlignSettings
@@ -78,7 +80,7 @@ class Surface:
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
 
-    def known(self, flattening: Flattening) -> None:
+    def known(self, flattening: Flat) -> None:
         """Take from elsewhere what would be computed when it is first asked for."""
         self.__dict__["flattening"] = flattening
 
@@ -88,6 +90,8 @@ class Surface:
         if self.tidy is not None:
             return self.tidy
         found = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
+        if self.within is None and _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
+            return found.turned()  # a closed surface has an outside by itself
         return found if self.within is None else piece_within(found, self.within)
 
     def piece(self, chosen: Booleans, said: str) -> Surface:
@@ -100,9 +104,12 @@ class Surface:
         return Parts.of(self.original, self.cleaned, self.keys)
 
     @cached_property
-    def flattening(self) -> Flattening:
+    def flattening(self) -> Flat:
         """Of the mesh in order, made fair where it is rough; raises `MeshError`, as for what is too long for a disc."""
         outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
+        if self.outer_vertex is None and _closed(self.cleaned.mesh):
+            closed = flatten_sphere(faired(self.cleaned.mesh))
+            return closed if closed.mesh is self.cleaned.mesh else replace(closed, exact=self.cleaned.mesh.vertices)
         found = flatten(faired(self.cleaned.mesh), fill_holes=self.fill_holes, outer_vertex=outer)
         if found.rim_lost > LOST:
             raise MeshError(
@@ -171,13 +178,23 @@ def cleaning_notes(tidy: Cleaned, other_parts: bool = False) -> tuple[str, ...]:
     return (f"'{tidy.mesh.name}': {', '.join(changes)}, for the computation only",) if changes else ()
 
 
-def flattening_notes(found: Flattening) -> tuple[str, ...]:
+def _closed(mesh: TriangleMesh) -> bool:
+    """Return whether a mesh is a sphere."""
+    return bool((mesh.twins >= 0).all()) and topology(mesh).is_sphere
+
+
+def _tetrahedra(mesh: TriangleMesh) -> Floats:
+    """Return the corners of the triangles about the middle, (m, 3, 3)."""
+    return mesh.vertices[mesh.faces] - mesh.vertices[mesh.used].mean(axis=0)
+
+
+def flattening_notes(found: Flat) -> tuple[str, ...]:
     """Say which openings were closed for the computation, and where the disc is too narrow for the surface."""
     lost = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
     return (*_opening_notes(found), *((lost,) if found.rim_lost > LITTLE else ()))
 
 
-def _opening_notes(found: Flattening) -> tuple[str, ...]:
+def _opening_notes(found: Flat) -> tuple[str, ...]:
     return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
 
 

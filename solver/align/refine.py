@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ..flatten.flatten import Flattening
+from ..flatten.domain import Domain
 from ..flatten.locate import TriangulatedDisc
-from ..mobius import Mobius
-from ..surface.mesh import Complexes, Floats, Integers
+from ..flatten.sphere import Flat
+from ..surface.mesh import Floats, Integers, Places
 from ..surface.sampling import HORIZON
 
 MOST_VERTICES = 3000
@@ -17,14 +18,14 @@ MOST_VERTICES = 3000
 
 
 def refined(
-    mobius: Mobius,
-    source: Flattening,
-    target: Flattening,
+    mobius: Any,
+    source: Flat,
+    target: Flat,
     source_descriptors: Floats,
     target_descriptors: Floats,
     scale: float,
     progress: Callable[[float], None] | None = None,
-) -> Mobius:
+) -> Any:
     """Return the transformation near `mobius` at which the descriptors of all vertices agree best.
 
     Maximises the area-weighted sum over source vertices of exp(-|d_j - d(f(m_j))|^2 / (2 scale^2)), d on the target
@@ -33,9 +34,9 @@ def refined(
 
     Parameters
     ----------
-    mobius : Mobius
+    mobius : Mobius or SphereMobius
         Where to begin.
-    source, target : Flattening
+    source, target : Flat
     source_descriptors, target_descriptors : (n, d) float64
         Standardised descriptors of the vertices.
     scale : float
@@ -43,20 +44,22 @@ def refined(
     progress : callable, optional
         Called before each evaluation with a share of the work, in [0, 1]; may raise to end it.
     """
-    used = np.flatnonzero(np.isfinite(source.disc.real))
+    used = np.flatnonzero(source.mesh.used)
     used = used[:: -(-len(used) // MOST_VERTICES)]
     share = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
-    disc = TriangulatedDisc.of(target.disc, target.mesh.faces)
-    slopes = _slopes(target.disc, target.mesh.faces, target_descriptors)
-    depth: Floats = 1.0 - np.abs(source.disc[used]).astype(np.float64)
+    domain = target.domain
+    disc = domain.triangulated(target.places, target.mesh.faces)
+    slopes = domain.gradients(target.places, target.mesh.faces, target_descriptors)
+    depth = domain.depth(source.places[used])
     stages = _stages(depth, share)
     for number, seen in enumerate(stages):
         chosen = used[seen]
         mobius = _improved(
             mobius,
-            source.disc[chosen],
+            source.places[chosen],
             source_descriptors[chosen],
             share[seen],
+            domain,
             disc,
             target_descriptors,
             slopes,
@@ -89,20 +92,21 @@ def _stages(depth: Floats, share: Floats) -> list[Integers]:
 
 
 def _improved(
-    mobius: Mobius,
-    points: Complexes,
+    mobius: Any,
+    points: Places,
     expected: Floats,
     weights: Floats,
+    domain: Domain,
     disc: TriangulatedDisc,
     target_descriptors: Floats,
-    slopes: Complexes,
+    slopes: Places,
     scale: float,
     progress: Callable[[float], None] | None,
-) -> Mobius:
+) -> Any:
     """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
     faces = disc.faces
 
-    def agreement(trial: Mobius) -> tuple[float, Complexes, Integers, Floats, Floats]:
+    def agreement(trial: Any) -> tuple[float, Places, Integers, Floats, Floats]:
         place = trial(points)
         face, barycentric = disc.locate(place)
         residual = expected - np.einsum("qk,qkd->qd", barycentric, target_descriptors[faces[face]])
@@ -112,19 +116,16 @@ def _improved(
     value, place, face, residual, term = agreement(mobius)
     damping = 1e-4
     for step_number in range(30):
-        # the transformations next to the identity move x by a - conj(a) x^2 + i t x
-        moves = np.stack([1 - place**2, 1j * (1 + place**2), 1j * place], axis=1)
-        slope = slopes[face]
-        jacobian = np.einsum("qd,qp->qdp", slope.real, moves.real) + np.einsum("qd,qp->qdp", slope.imag, moves.imag)
+        jacobian = domain.jacobian(place, slopes[face])
         weighted = jacobian * term[:, None, None]
         normal = np.einsum("qdp,qdr->pr", weighted, jacobian)
         force = np.einsum("qdp,qd->p", weighted, residual)
         while damping < 1e6:
             if progress:
                 progress(step_number / 30)
-            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), force)
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(force)), force)
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial = _small(step) @ mobius
+            trial = domain.near_identity(step) @ mobius
             found = agreement(trial)
             if found[0] > value:
                 break
@@ -137,19 +138,3 @@ def _improved(
         if gain < 1e-5 * value:
             break
     return mobius
-
-
-def _slopes(points: Complexes, faces: Integers, values: Floats) -> Complexes:
-    """Return the gradient of values that are linear in each triangle, (m, d): along x and y as real and imaginary."""
-    corner = points[faces]
-    opposite = corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]]
-    twice_area = np.imag(np.conj(corner[:, 1] - corner[:, 0]) * (corner[:, 2] - corner[:, 0]))
-    # the gradient of a corner's hat function is its opposite side turned by a right angle, over twice the area
-    hat = 1j * opposite / np.where(twice_area > 0, twice_area, np.inf)[:, None]
-    return np.einsum("mk,mkd->md", hat, values[faces])
-
-
-def _small(step: Floats) -> Mobius:
-    """Return the transformation that moves x by a - conj(a) x^2 + i t x, nearly, for step (re a, im a, t)."""
-    a, turn = complex(step[0], step[1]), float(step[2])
-    return Mobius(-a, turn)

@@ -19,6 +19,9 @@ class AlignSettings:
         Hyperbolic radius of the match discs, in (0, 1). Default: each point's distance to its second nearest neighbour.
     z_max : float
         Bound on |z|, in (0, 1): how far the centres of the two discs may lie apart.
+    h_max : float
+        Bound on |h| for closed surfaces, in [0, 0.9]; both spheres are centred by area, and right maps of cortices,
+        heads and inflated surfaces have |h| below 0.15. 0: rotations alone.
     compatible : float
         Share of the target that a source point may match, in (0, 1]: what is most like it. On 7 sets of pairs 87 to
         98 % of the counterparts are within 0.2, and beyond they are no likelier than chance (`tests/bench/ranks.py`).
@@ -55,6 +58,7 @@ class AlignSettings:
     targets: int = 1000
     radius: float | None = None
     z_max: float = 0.8337  # tanh(1.2)
+    h_max: float = 0.2
     compatible: float = 0.2
     reflect: str = "auto"
     reflect_margin: float = 0.06
@@ -80,6 +84,8 @@ class AlignSettings:
             raise ValueError("samples and targets must be at least 3: a Möbius transformation has three parameters")
         if not 0 < self.z_max < 1:
             raise ValueError(f"z_max must lie between 0 and 1, not {self.z_max}")
+        if not 0 <= self.h_max <= 0.9:
+            raise ValueError(f"h_max must lie between 0 and 0.9, not {self.h_max}")
         if self.radius is not None and not 0 < self.radius < 1:
             raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
         if self.time_limit is not None and not self.time_limit >= 0:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..flatten.flatten import Flattening
+from ..flatten.sphere import Flat, SphereFlattening
 from ..surface.mesh import MeshError, TriangleMesh
 from .prepared import Surface
 
@@ -41,7 +42,7 @@ def save_surface(path: Path | str, surface: Surface) -> None:
             largest_part=surface.largest_part,
             outer_vertex=-1 if surface.outer_vertex is None else surface.outer_vertex,
             computed=flat.mesh.vertices,
-            disc=flat.disc,
+            disc=flat.places,
             boundary=flat.boundary,
             holes=np.concatenate([np.empty(0, np.intp), *flat.holes]),
             hole_sizes=np.array([len(loop) for loop in flat.holes], np.intp),
@@ -96,6 +97,11 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     if not np.array_equal(computed, mesh.vertices):
         exact = mesh.vertices
         mesh = TriangleMesh(computed, mesh.faces, mesh.name)
+    if stored["disc"].ndim == 2:
+        sphere = stored["disc"].astype(np.float64, casting="safe")
+        _require(sphere.shape == (size, 3) and bool((np.isfinite(sphere).all(axis=1) == mesh.used).all()), "the sphere")
+        _require(bool((np.abs(np.linalg.norm(sphere[mesh.used], axis=1) - 1) < 1e-12).all()), "the sphere")
+        return _filled(surface, SphereFlattening(mesh, sphere, int(stored["flips_repaired"]), exact), stored)
     disc = stored["disc"].astype(np.complex128, casting="safe")
     _require(disc.shape == (size,) and (np.isfinite(disc) == mesh.used).all(), "the disc")
     _require(bool((np.abs(disc[mesh.used]) <= 1 + 1e-12).all()), "the disc")
@@ -111,6 +117,12 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
         float(stored["rim_lost"]),
         exact,
     )
+    return _filled(surface, flat, stored)
+
+
+def _filled(surface: Surface, flat: Flat, stored: dict[str, np.ndarray]) -> Surface:
+    """Return a surface with what a file holds of it beside the mesh."""
+    size = len(flat.mesh.vertices)
     surface.known(flat)
     if "descriptors" in stored:
         surface.measured = stored["descriptors"].astype(np.float64, casting="safe")

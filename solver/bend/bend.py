@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc
-from ..mobius import Mobius
-from ..surface.mesh import Booleans, Complexes, Floats, Integers, TriangleMesh
+from ..flatten.sphere import Flat
+from ..mobius import Mobius, SphereMobius
+from ..surface.mesh import Booleans, Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
@@ -27,6 +26,7 @@ from .plate import NORMAL_WEIGHT, relaxed
 from .pose import in_pose, misfit, rigidly
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold import injective
+from .unfold_sphere import injective_on_sphere
 
 NODES = 1500
 """Target vertices that are bent; all others follow them."""
@@ -58,7 +58,7 @@ class Bending:
         Vertices that were moved so that no triangle is folded.
     """
 
-    carried: Complexes
+    carried: Places
     offset: Floats
     repaired: int
 
@@ -89,7 +89,7 @@ class Draft:
 
     onto: SurfacePoints
     whole: TriangleMesh
-    conformal: Complexes
+    conformal: Places
     growth: float
     unbent: Floats
     few: Coarse
@@ -101,23 +101,23 @@ class Draft:
         """Return where all target vertices are, (n, 3), in the frame of `onto`; 0 at vertices in no face."""
         return self.few.following(self.flat.vertices, self.now, self.unbent)
 
-    def located(self, target: Flattening) -> tuple[Integers, Floats]:
+    def located(self, target: Flat) -> tuple[Integers, Floats]:
         """Return the source's face nearest to each target vertex, (n,), and where in it, (n, 3).
 
         -1 and 0 at vertices in no face.
         """
         places = self.places()
         normals = TriangleMesh(places, self.whole.faces).vertex_normals()
-        used = np.flatnonzero(np.isfinite(target.disc.real))
+        used = np.flatnonzero(target.mesh.used)
         face, barycentric = np.full(len(places), -1), np.zeros((len(places), 3))
         face[used], barycentric[used] = self.onto.nearest_point(places[used], normals[used])
         return face, barycentric
 
 
 def drafted(
-    mobius: Mobius,
-    source: Flattening,
-    target: Flattening,
+    mobius: Mobius | SphereMobius,
+    source: Flat,
+    target: Flat,
     trust: Floats | None = None,
     start: Floats | None = None,
     rounds: int = DRAFT_ROUNDS,
@@ -133,7 +133,7 @@ def drafted(
     ----------
     mobius : Mobius
         From the source's disc to the target's.
-    source, target : Flattening
+    source, target : Flat
     trust : (n,) float64, optional
         How far the Möbius map is to be believed at each target vertex, in (0, 1]: scale, pose and coarse bend are taken
         from where it is. Default: everywhere.
@@ -146,15 +146,16 @@ def drafted(
         Called with the share of the work done, in [0, 1]; may raise to end it.
     """
     tell = progress or (lambda _: None)
-    middle = source.mesh.vertices[source.boundary].mean(axis=0)
+    about = source.boundary if len(source.boundary) else source.mesh.used
+    middle = source.mesh.vertices[about].mean(axis=0)
     onto = SurfacePoints(
         TriangleMesh((source.mesh.vertices - middle) / np.sqrt(source.mesh.area), source.mesh.faces),
-        (source.boundary, *source.holes),
+        source.loops,
         NORMAL_WEIGHT,
     )
-    used = np.flatnonzero(np.isfinite(target.disc.real))
-    conformal = np.full(len(target.disc), complex(np.nan, np.nan))
-    conformal[used] = mobius.inverse()(target.disc[used])
+    used = np.flatnonzero(target.mesh.used)
+    conformal = target.domain.nowhere(len(target.places))
+    conformal[used] = mobius.inverse()(target.places[used])
     whole, order = facing(target.mesh, mobius.reflected)
 
     tell(0.0)
@@ -205,8 +206,8 @@ def _best_start(
 
 def finished(
     draft: Draft,
-    source: Flattening,
-    target: Flattening,
+    source: Flat,
+    target: Flat,
     alike: Booleans | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Bending:
@@ -215,7 +216,7 @@ def finished(
     Parameters
     ----------
     draft : Draft
-    source, target : Flattening
+    source, target : Flat
         As for `drafted`.
     alike : (n,) bool, optional
         Target vertices that are drawn to the source's boundaries where they are on a boundary themselves; not those
@@ -230,8 +231,8 @@ def finished(
     """
     tell = progress or (lambda _: None)
     onto, unbent, flat, few, conformal = draft.onto, draft.unbent, draft.flat, draft.few, draft.conformal
-    drawn = np.ones(len(target.disc), bool) if alike is None else alike
-    used = np.flatnonzero(np.isfinite(target.disc.real))
+    drawn = np.ones(len(target.places), bool) if alike is None else alike
+    used = np.flatnonzero(target.mesh.used)
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:]
     now = relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
@@ -257,21 +258,23 @@ def finished(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
     )
     reached = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
-    offset = np.zeros(len(target.disc))
+    offset = np.zeros(len(target.places))
     offset[used] = np.linalg.norm(reached - all_places[used], axis=1)
     carried = conformal.copy()
-    carried[used] = (source.disc[source.mesh.faces[face]] * barycentric).sum(axis=1)
+    carried[used] = source.domain.mean(source.places, source.mesh.faces[face], barycentric)
     tell(0.95)
-    carried, repaired = injective(
-        carried, conformal, target.mesh.faces[:, order], target.boundary, target.holes, lambda: tell(0.95)
-    )
+    faces = target.mesh.faces[:, order]
+    if source.domain.closed:
+        carried, repaired = injective_on_sphere(carried, conformal, faces, lambda: tell(0.95))
+    else:
+        carried, repaired = injective(carried, conformal, faces, target.boundary, target.holes, lambda: tell(0.95))
     return Bending(carried, offset, repaired)
 
 
 def bent(
-    mobius: Mobius,
-    source: Flattening,
-    target: Flattening,
+    mobius: Mobius | SphereMobius,
+    source: Flat,
+    target: Flat,
     progress: Callable[[float], None] | None = None,
 ) -> Bending:
     """Bend the target onto the source, all of it: `drafted`, then `finished`."""
@@ -285,9 +288,9 @@ def _lengths(stiffest: float, softest: float, rounds: int) -> Floats:
     return np.geomspace(stiffest, softest, rounds)
 
 
-def _positions(disc_points: Complexes, source: Flattening, onto: SurfacePoints) -> Floats:
-    """Return where points of the source's disc lie on the scaled source, (q, 3)."""
-    face, barycentric = TriangulatedDisc.of(source.disc, source.mesh.faces).locate(disc_points)
+def _positions(places: Places, source: Flat, onto: SurfacePoints) -> Floats:
+    """Return where points of the source's domain lie on the scaled source, (q, 3)."""
+    face, barycentric = source.domain.triangulated(source.places, source.mesh.faces).locate(places)
     return np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
 
 

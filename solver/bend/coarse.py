@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import Delaunay, KDTree
+from scipy.spatial import KDTree
 
-from ..flatten.distortion import signed_areas
-from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc, plane
-from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh
+from ..flatten.domain import Domain
+from ..flatten.sphere import Flat
+from ..surface.mesh import Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
 from ..surface.sampling import edge_graph, thinned
 from .rotations import smooth_rotations
@@ -59,13 +58,13 @@ class Coarse:
         return result
 
 
-def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
+def coarse(flattening: Flat, count: int, order: list[int]) -> Coarse:
     """Return about `count` nodes spread evenly over a surface, the corners of their triangles in the given order.
 
     On a surface with no more vertices than that, all are nodes. Where the disc is crowded the triangles are dual to the
     regions of vertices nearest to each node, along the edges: one for each face whose corners lie in three of them.
     """
-    mesh, used = flattening.mesh, np.flatnonzero(np.isfinite(flattening.disc.real))
+    mesh, used = flattening.mesh, np.flatnonzero(flattening.mesh.used)
     if len(used) <= count:
         place = np.zeros(len(mesh.vertices), np.intp)
         place[used] = np.arange(len(used))
@@ -74,11 +73,12 @@ def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     # as dense along the boundary as inside, for a round surface
     rim = flattening.boundary[:: max(1, round(len(flattening.boundary) / (3.5 * np.sqrt(count))))]
     nodes = np.concatenate([inner[thinned(mesh.vertices[inner], np.sqrt(0.53 * mesh.area / count))], rim])
-    disc = flattening.disc
-    apart = KDTree(plane(disc[nodes])).query(plane(disc[nodes]), k=2)[0][:, 1].min()
+    domain, places = flattening.domain, flattening.places
+    spots = domain.coordinates(places[nodes])
+    apart = KDTree(spots).query(spots, k=2)[0][:, 1].min()
     if apart > CROWDED:
-        nodes, faces = _delaunay(disc, nodes)
-        leaders, weights = TriangulatedDisc.of(disc[nodes], faces).locate(disc[used])
+        nodes, faces = _delaunay(domain, places, nodes)
+        leaders, weights = domain.triangulated(places[nodes], faces).locate(places[used])
         return Coarse(nodes, faces[:, order], used, faces[leaders], weights)
     region = _regions(mesh, nodes)
     faces = _dual(region[mesh.faces])
@@ -92,11 +92,9 @@ def coarse(flattening: Flattening, count: int, order: list[int]) -> Coarse:
     return Coarse(nodes, faces[:, order], used, leaders, weights)
 
 
-def _delaunay(disc: Complexes, nodes: Integers) -> tuple[Integers, Integers]:
-    """Return the nodes and their Delaunay triangles in the disc, (f, 3), without slivers."""
-    faces = Delaunay(plane(disc[nodes])).simplices.astype(np.intp)
-    turned = signed_areas(disc[nodes], faces)
-    faces = np.where((turned < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turned) > 1e-12]
+def _delaunay(domain: Domain, places: Places, nodes: Integers) -> tuple[Integers, Integers]:
+    """Return the nodes and their Delaunay triangles in the domain, (f, 3), without slivers."""
+    faces = domain.delaunay(places[nodes])
     held, place = np.unique(faces, return_inverse=True)
     return nodes[held], place.reshape(-1, 3)
 

@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 
 from ..align.alignment import Alignment
 from ..align.whole import Whole
-from ..flatten.flatten import Flattening
-from ..surface.mesh import Booleans, Complexes, Floats, Integers
+from ..flatten.sphere import Flat
+from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned
 
 
@@ -68,11 +68,11 @@ def correspond(alignment: Alignment) -> Correspondence:
     vertices are those of the meshes as they came, whatever was put in order for the computation.
     """
     source, target = alignment.source, alignment.target
-    used = np.flatnonzero(np.isfinite(target.disc.real))
+    used = np.flatnonzero(target.mesh.used)
     face, barycentric = alignment.located
     confidence = alignment.confidence.copy()
     confidence[used[in_openings(source, alignment.carried[used], face[used], barycentric[used])]] = 0
-    triangles, size = source.mesh.faces, len(source.disc)
+    triangles, size = source.mesh.faces, len(source.places)
     if (tidy := alignment.source_cleaned) is not None and tidy.changes:
         triangles, size = tidy.original_faces, tidy.size
         face, barycentric = _in_own_triangles(face, barycentric, tidy)
@@ -136,11 +136,13 @@ def _beside_missing(face: Integers, barycentric: Floats, tidy: Cleaned) -> tuple
     return face, barycentric
 
 
-def in_openings(flattening: Flattening, places: Complexes, face: Integers, barycentric: Floats) -> Booleans:
+def in_openings(flattening: Flat, places: Places, face: Integers, barycentric: Floats) -> Booleans:
     """Return which points of the disc, (q,), lie in an opening: their nearest point, as located, is on its rim."""
-    on_rim = np.zeros(len(flattening.disc), bool)
+    if not flattening.holes:
+        return np.zeros(len(face), bool)
+    on_rim = np.zeros(len(flattening.places), bool)
     for loop in flattening.holes:
         on_rim[loop] = True
     corners = flattening.mesh.faces[face]
-    nearest = (flattening.disc[corners] * barycentric).sum(axis=1)
+    nearest = flattening.domain.mean(flattening.places, corners, barycentric)
     return (on_rim[corners] | (barycentric == 0)).all(axis=1) & (np.abs(nearest - places) > 1e-9)

@@ -45,8 +45,9 @@ def save_map(
 
     Arrays: face (n_target,) int, barycentric (n_target, 3), matched (n_target,) bool, confidence (n_target,),
     source_triangles (m, 3) int, source_size, source_fingerprint and target_fingerprint (text), source_disc and
-    target_disc complex, z complex, theta, reflected; of meshes with several parts also part (n_target,), source_part
-    (n_source,) and leader (n_target,) int, as of `Correspondence`. The discs are of the main parts.
+    target_disc complex, z complex, theta, reflected; of closed surfaces the discs are spheres, (n, 3), and in place of
+    z and theta there are h, (3,), and rotation, (4,), a quaternion; of meshes with several parts also part (n_target,),
+    source_part (n_source,) and leader (n_target,) int, as of `Correspondence`. The discs are of the main parts.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def save_map(
     """
     meshes = source or alignment.source.mesh, target or alignment.target.mesh
     source_disc, target_disc = (
-        flattening.disc if tidy is None else tidy.at_vertices(flattening.disc, np.nan)
+        flattening.places if tidy is None else tidy.at_vertices(flattening.places, np.nan)
         for flattening, tidy in (
             (alignment.source, alignment.source_cleaned),
             (alignment.target, alignment.target_cleaned),
@@ -76,9 +77,7 @@ def save_map(
             target_fingerprint=meshes[1].fingerprint,
             source_disc=source_disc,
             target_disc=target_disc,
-            z=alignment.mobius.z,
-            theta=alignment.mobius.theta,
-            reflected=alignment.mobius.reflected,
+            **vars(alignment.mobius),
             **{name: found for name in _OF_PARTS if (found := getattr(correspondence, name)) is not None},
         )
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..align.alignment import Alignment
 from ..align.whole import Whole
-from ..mobius import Mobius
+from ..mobius import Mobius, SphereMobius
+from ..search.sphere_search import SphereSearchResult
 from ..surface.mesh import Booleans
 from ..surface.parts import Parts
 from ..surface.tidy import Cleaned
@@ -39,7 +40,17 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "gap": found.upper_bound - alignment.value,
         "certified": alignment.certified,
         "rival_taken": alignment.taken is not None,
-        "certified_for": f"|z| <= {alignment.settings.z_max:.4f}",
+        "certified_for": f"|h| <= {found.h_max:.4f}"
+        if isinstance(found, SphereSearchResult)
+        else f"|z| <= {alignment.settings.z_max:.4f}",
+        **(
+            {
+                "proved": found.proved,
+                "rotation": {"value": found.rotation_value, "upper_bound": found.rotation_bound},
+            }
+            if isinstance(found, SphereSearchResult)
+            else {}
+        ),
         "samples": len(alignment.source_samples),
         "targets": len(alignment.target_samples),
         "matches": len(alignment.matches),
@@ -114,5 +125,7 @@ def _share(tidy: Cleaned | None) -> float:
     return 1.0 if tidy is None else tidy.share
 
 
-def _plain(mobius: Mobius) -> dict[str, Any]:
+def _plain(mobius: Mobius | SphereMobius) -> dict[str, Any]:
+    if isinstance(mobius, SphereMobius):
+        return {"h": list(mobius.h), "rotation": list(mobius.rotation), "reflected": mobius.reflected}
     return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..align.prepared import Surface
 from ..flatten.locate import TriangulatedDisc
+from ..flatten.sphere import require_open
 from ..mobius import Mobius
 from ..surface.mesh import Complexes, Floats, Integers
 from ..surface.tidy import Cleaned
@@ -45,7 +46,7 @@ class Chart:
     @staticmethod
     def of(surface: Surface, samples: int) -> Chart:
         """Return the chart of a prepared surface with its points chosen for a search."""
-        flat, tidy = surface.flattening, surface.cleaned
+        flat, tidy = require_open(surface.flattening), surface.cleaned
         mesh = tidy.mesh
         chosen = surface.source_points(samples)
         return Chart(mesh.vertices, flat.disc, mesh.faces, mesh.vertex_areas, chosen, mesh.diagonal, tidy)

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..align.alignment import Alignment
+from ..flatten.sphere import require_open
 from ..mobius import Mobius
 from .distance import EvenFlow, continuous_procrustes
 
@@ -72,9 +73,10 @@ def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
     """Return what is known of a pair that was aligned; `flow` is that of its source."""
     decisive = alignment if alignment.overlap is None else alignment.overlap.alignment
     mobius = alignment.mobius
+    assert isinstance(mobius, Mobius)  # of discs
     distance = continuous_procrustes(
         flow,
-        alignment.target,
+        require_open(alignment.target),
         alignment.located,
         mirrored=mobius.reflected,
         points=alignment.target_samples[: alignment.settings.targets],

@@ -20,6 +20,7 @@ from ..align.settings import AlignSettings
 from ..align.surface_file import load_surface, save_surface
 from ..carry.correspond import correspond
 from ..carry.map_file import save_map
+from ..flatten.sphere import require_open
 from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh
 from .distance import EvenFlow
 from .pair import figures
@@ -98,6 +99,7 @@ def _prepare(task: Prepare) -> Result:
     begun = time.process_time()
     mesh = TriangleMesh(task.vertices, task.faces, task.name)
     surface = prepare(mesh, AlignSettings(**task.settings), largest_part=task.largest_part, keys=task.keys)
+    require_open(surface.flattening)
     with whole_file(Path(task.path)) as path:
         save_surface(path, surface)
     return {
@@ -117,7 +119,7 @@ class _Known:
 
     @cached_property
     def flow(self) -> EvenFlow:
-        return EvenFlow(self.surface.flattening)
+        return EvenFlow(require_open(self.surface.flattening))
 
 
 @lru_cache(maxsize=KEPT)

@@ -11,11 +11,12 @@ from ..mobius import Mobius, conformal_barycentre
 from ..surface.holes import filled
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
-from ..surface.mesh import Complexes, Floats, Integers, MeshError, TriangleMesh, edges_of_sides, twin_sides
+from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
 from .circle import lost_rim, on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
+from .domain import DISC, Domain
 from .harmonic import riemann_map
 from .injective import require_injective, untangled
 from .mid_edge import mid_edge_map
@@ -53,6 +54,21 @@ class Flattening:
     flips_repaired: int = 0
     rim_lost: float = 0.0
     exact: Floats | None = None
+
+    @property
+    def places(self) -> Places:
+        """The disc: what `SphereFlattening.places` is on the sphere."""
+        return self.disc
+
+    @property
+    def domain(self) -> Domain:
+        """Where the places are."""
+        return DISC
+
+    @property
+    def loops(self) -> tuple[Integers, ...]:
+        """All boundary loops, the outer one first."""
+        return (self.boundary, *self.holes)
 
     @cached_property
     def distortion(self) -> Distortion:

@@ -19,11 +19,13 @@ from scipy.sparse.csgraph import dijkstra
 from ..mobius import spherical_barycentre
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import cotangents, mollified_lengths
-from ..surface.mesh import Complexes, Floats, Integers, TriangleMesh, edges_of_sides, twin_sides
+from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.sampling import edge_graph
 from ..surface.statistics import weighted_median
 from ..surface.topology import require_sphere
 from .distortion import Distortion, spherical_distortion
+from .domain import SPHERE, Domain
+from .flatten import Flattening
 from .harmonic import riemann_map
 from .injective import untangled
 from .sphere_injective import require_injective, untangled_sphere
@@ -52,10 +54,50 @@ class SphereFlattening:
     flips_repaired: int = 0
     exact: Floats | None = None
 
+    @property
+    def places(self) -> Places:
+        """The sphere: what `Flattening.places` is in the disc."""
+        return self.sphere
+
+    @property
+    def domain(self) -> Domain:
+        """Where the places are."""
+        return SPHERE
+
+    @property
+    def boundary(self) -> Integers:
+        """None: (0,)."""
+        return np.empty(0, np.intp)
+
+    @property
+    def holes(self) -> tuple[Integers, ...]:
+        """None."""
+        return ()
+
+    @property
+    def loops(self) -> tuple[Integers, ...]:
+        """None."""
+        return ()
+
+    @property
+    def rim_lost(self) -> float:
+        """None."""
+        return 0.0
+
     @cached_property
     def distortion(self) -> Distortion:
         """How far the map is from conformal."""
         return spherical_distortion(self.mesh, self.sphere)
+
+
+Flat = Flattening | SphereFlattening
+
+
+def require_open(flat: Flat) -> Flattening:
+    """Return a flattening that is a disc; raises `MeshError` of a sphere, where only discs go on."""
+    if isinstance(flat, Flattening):
+        return flat
+    raise MeshError(f"'{flat.mesh.name}' is closed, and collections take open surfaces only: cut all open alike")
 
 
 def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mobius import Mobius, hyperbolic_distance
+from ..mobius import Mobius, SphereMobius, hyperbolic_distance
 from ..stages import SearchProgress
 from ..surface.mesh import Integers
 from .branch_and_bound import search
@@ -41,7 +41,7 @@ class Rival:
         Whether the time limit ended the search: only then do its figures depend on the machine.
     """
 
-    mobius: Mobius
+    mobius: Mobius | SphereMobius
     value: float
     upper_bound: float
     matches: Integers

@@ -74,6 +74,8 @@ class SurfacePoints:
 
     def nearest_on_boundary(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the boundary's nearest point and its unit tangent there, (q, 3) each; to a quarter of an edge."""
+        if not self.loops:  # nobody asks for any
+            return points.copy(), np.zeros_like(points)
         tree, at, along = self._rim
         found = tree.query(points)[1]
         tangent = along[found]

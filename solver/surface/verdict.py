@@ -38,6 +38,8 @@ class Verdict:
         if self.hanging:
             return (*self.tidy.changes, self._cutting())
         loops = list(self.topology.boundary_loops)
+        if not loops:
+            return self.tidy.changes
         del loops[int(np.argmax(self.topology.loop_lengths))]
         closed = closing(loops)
         changes = [
@@ -49,7 +51,9 @@ class Verdict:
     def describe(self) -> str:
         """Return one line that says what the mesh is and what will be done about it."""
         found = self.topology
-        if self.hanging:
+        if found.is_sphere:
+            text = f"closed, {found.vertices:,} vertices: goes to the sphere, beside another closed one"
+        elif self.hanging:
             text = f"closed, {found.vertices:,} vertices"
         else:
             rim = found.boundary_loops[int(np.argmax(found.loop_lengths))]
@@ -66,7 +70,10 @@ class Verdict:
         """Say what will be cut out."""
         shares = ", ".join(f"{share:.1%}" for share in self.hanging[:6]) + (", ..." if len(self.hanging) > 6 else "")
         pieces = plural(len(self.hanging), "piece")
-        return f"cut to what fits the other surface, of {pieces} that hang on it by a neck ({shares} of its area)"
+        beside = "beside an open surface " if self.topology.is_sphere else ""
+        return (
+            f"{beside}cut to what fits the other surface, of {pieces} that hang on it by a neck ({shares} of its area)"
+        )
 
 
 def verdict(
@@ -77,13 +84,13 @@ def verdict(
     Raises
     ------
     MeshError
-        It cannot be made a disc; the text says why and what to do.
+        It cannot be made a disc and is no sphere; the text says why and what to do.
     """
     tidy = cleaned(mesh, largest_part=largest_part, fill_holes=fill_holes, keys=keys)
     found = topology(tidy.mesh)
     if found.is_closed and (hanging := necks(tidy.mesh)):
         return Verdict(tidy, found, tuple(neck.share for neck in hanging))
-    return Verdict(tidy, require_disc(tidy.mesh, fill_holes=fill_holes))
+    return Verdict(tidy, found if found.is_sphere else require_disc(tidy.mesh, fill_holes=fill_holes))
 
 
 def closing(openings: Sequence[Integers]) -> str:

@@ -92,7 +92,7 @@ def test_the_line_under_a_picker() -> None:
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     cube = make_object("Cube", corners, quads)
-    assert lines(cube, fill_holes=True) == ("closed surface:", "cut it first")
+    assert lines(cube, fill_holes=True) == ("closed, 8 vertices",)
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert lines(parts, largest_part=False) == ("2 separate parts:", "keep one, or turn on Largest Part")
     assert lines(parts) == ("disc, 28 vertices", "mended for the computation: 1")

@@ -36,7 +36,7 @@ def test_check_exits_1_for_what_can_be_no_disc_and_2_for_what_is_unreadable(
     (scans / "line.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
     status, out, err = run(capsys, "check", scans / "cube.obj", scans / "line.obj", scans / "target.obj")
     assert (status, err) == (1, "")
-    assert "cube.obj: cannot be used: it is closed (it has no boundary)" in out
+    assert "cube.obj: closed, 8 vertices: goes to the sphere" in out
     assert "line.obj: cannot be used: it has only faces without area" in out
     assert len(out.splitlines()) == 3
     status, out, err = run(capsys, "check", scans / "gone.obj", scans / "target.obj")
