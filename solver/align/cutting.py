@@ -1,8 +1,9 @@
 """A piece cut out of a surface that no disc carries as a whole, as a head out of a body: the one that the other shows.
 
 On the disc of a whole body most of the skin shrinks to nothing, and a closed surface beside an open one has no disc at
-all (two closed ones go to the sphere). What sticks out of it is cut off where the loop around is shortest, each such piece is tried beside the other surface, and the one
-that fits takes the place of the whole; the rest has no counterpart.
+all (two closed ones go to the sphere). What sticks out of it is cut off where the loop around is shortest, each such
+piece is tried beside the other surface, and the one that fits takes the place of the whole; the rest has no
+counterpart.
 """
 
 from __future__ import annotations
