@@ -163,7 +163,7 @@ GERMAN = {
     "Only the largest part of each mesh": "Nur der größte Teil jedes Meshes",
     "Pairing parts": "Teile zuordnen",
     "Parts": "Teile",
-    "No rotation matches more, no other map more than {:.1f} %": "Keine Drehung passt besser, keine andere Abbildung um mehr als {:.1f} %",
+    "No rotation matches more, no map with {} over {:.1f} % more": "Keine Drehung passt besser, keine Abbildung mit {} um über {:.1f} %",
     "Own": "Eigenes",
     "Pictures in a new material, packed into the file": "Bilder in einem neuen Material, in die Datei gepackt",
     "Pictures of the source's materials, drawn anew for the target's UV map, in a material of their own": "Bilder der Materialien der Quelle, für die UV-Map des Ziels neu gezeichnet, in einem eigenen Material",

@@ -249,14 +249,15 @@ def summary(source: str, target: str, alignment: solver.Alignment, correspondenc
 def _proof(alignment: solver.Alignment) -> str:
     """Say what a search found and proved."""
     search = alignment.search
-    if alignment.certified:
+    if isinstance(search, solver.SphereSearchResult) and alignment.taken is None:
+        also = search.rotations_certified and search.h_max > 0
+        proof = f"proved: {search.proved}" + ("; no rotation matches more" if also else "")
+    elif alignment.certified:
         # the other orientation's best may be ahead
         among = " in this orientation" if alignment.margin is not None and alignment.margin < 0 else ""
         proof = f"certified: no Möbius map with |z| <= {alignment.settings.z_max:.2f} matches more{among}"
     elif alignment.taken is not None:
         proof = f"not the best match: another map has {search.value:.2f}"
-    elif isinstance(search, solver.SphereSearchResult):
-        proof = f"proved: {search.proved}" + ("; no rotation matches more" if search.rotations_certified else "")
     else:
         proof = f"not certified: the proven bound is {search.upper_bound:.2f}, a gap of {search.gap:.2f}"
     return f"matched value {alignment.value:.2f} of at most {len(alignment.source_samples)}, {proof}"

@@ -1,5 +1,6 @@
 """Source and target beside each other, in one pose, with one pattern carried by the alignment."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -7,12 +8,12 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
-from ...solver import MeshError
+from ...solver import Correspondence, MeshError
 from ...solver.carry.fitted import similarity
-from ...solver.surface.mesh import Floats
+from ...solver.surface.mesh import Complexes, Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
-from ..mesh_data import Refusal, read_surface, seen_positions
+from ..mesh_data import Refusal, Surface, read_surface, seen_positions
 from ..results import pattern_color, read_layout, require_room, write_color
 from ..textures.writing import has_pictures
 from ..usable import why_not_aligned
@@ -44,18 +45,16 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
         try:
             surfaces = read_surface(source), read_surface(target)
             found = stored_alignment.load(target, source, surfaces)
-            layouts = read_layout(source), read_layout(target)
-            if layouts[0] is None or layouts[1] is None:
-                raise Refusal(rpt_("The shared layout was removed: press Align again"))
+            hues = _hues(source, target, surfaces, found)
             for obj in (source, target):
                 require_room(obj, [], [PATTERN_COLOR])
         except (Refusal, MeshError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         on_source = surfaces[0].mesh.vertices / np.linalg.norm(np.ptp(surfaces[0].mesh.vertices, axis=0))
-        for obj, layout, there in ((source, layouts[0], on_source), (target, layouts[1], found.matrix() @ on_source)):
-            known = np.isfinite(layout.disc)
-            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, layout.disc, 0), there), known)
+        for obj, hue, there in zip((source, target), hues, (on_source, found.matrix() @ on_source), strict=True):
+            known = np.isfinite(hue)
+            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, hue, 0), there), known)
         places = [_world(obj) for obj in (source, target)]
         some = found.matched if found.matched.any() else found.face >= 0
         pose = similarity(places[1][some], (found.matrix() @ places[0])[some])
@@ -105,6 +104,22 @@ class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
             target.select_set(True)
             context.view_layer.objects.active = target
         return {"FINISHED"}
+
+
+def _hues(source: Any, target: Any, surfaces: Sequence[Surface], found: Correspondence) -> tuple[Complexes, Complexes]:
+    """Return points of the unit disc that tell the vertices of both apart, nan where there is none.
+
+    They are those of the shared layout. Closed surfaces have none: of them it is the source seen along its y axis.
+    """
+    mesh = surfaces[0].mesh
+    if all((surface.mesh.twins >= 0).all() for surface in surfaces):
+        middle = (mesh.vertices.max(axis=0) + mesh.vertices.min(axis=0)) / 2
+        seen = (mesh.vertices - middle) @ np.array([1, 0, 1j]) * (2 / mesh.diagonal)
+        return seen, np.where(found.face >= 0, found.matrix() @ seen, np.nan)
+    layouts = read_layout(source), read_layout(target)
+    if layouts[0] is None or layouts[1] is None:
+        raise Refusal(rpt_("The shared layout was removed: press Align again"))
+    return layouts[0].disc, layouts[1].disc
 
 
 def is_shown(context: bpy.types.Context) -> bool:

@@ -37,8 +37,8 @@ class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
             column.label(text="Certified: none matches more", icon="CHECKMARK")
         elif "rotation" in found and found["rotation"]["upper_bound"] <= found["value"]:
             share = 100 * found["gap"] / max(found["value"], 1e-9)
-            said = iface_("No rotation matches more, no other map more than {:.1f} %")
-            column.label(text=said.format(share), icon="CHECKMARK", translate=False)
+            said = iface_("No rotation matches more, no map with {} over {:.1f} % more")
+            column.label(text=said.format(found["certified_for"], share), icon="CHECKMARK", translate=False)
         elif found["rival_taken"]:
             column.label(text=iface_("Not the best match: gap {:.2f}").format(found["gap"]), icon="INFO")
         else:
