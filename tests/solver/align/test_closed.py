@@ -1,6 +1,7 @@
 """Closed surfaces through the whole pipeline: aligned on the sphere, bent, carried, reported, kept in files."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,8 +23,12 @@ from solver import (
     save_surface,
     verdict,
 )
+from solver.align.dense import drafted_from
+from solver.align.hypotheses import by_pose
+from solver.collection.chart import Chart
 from solver.flatten.distortion import signed_volumes
 from solver.flatten.locate import TriangulatedSphere
+from solver.stages import Stages
 
 FEW = AlignSettings(samples=60, targets=400, reflect="never")
 
@@ -88,6 +93,25 @@ def test_landmarks_join_the_search():
     found = align(mesh, mesh, FEW, landmarks=[[5, 5], [300, 300], [900, 900]])
     assert len(found.source_samples) > 60
     assert np.abs(interpolate(correspond(found), mesh.vertices) - mesh.vertices).max() < 0.01
+
+
+def test_a_rigid_pose_implies_a_transformation_of_the_sphere():
+    mesh = ball(1200, seed=2)
+    turn = random_mobius(np.random.default_rng(3), 0, reflect=False).matrix
+    matched = align(mesh, TriangleMesh(2 * mesh.vertices @ turn.T + 1, mesh.faces), replace(FEW, refine="mobius"))
+    clock = Stages(None).part(0.0, 1.0)
+    wrong = replace(matched, mobius=random_mobius(np.random.default_rng(4), 0.1, reflect=False))
+    found = by_pose(wrong, drafted_from(wrong, clock)[0].onto).alignment
+    assert isinstance(found.mobius, SphereMobius)
+    there = found.mobius(found.source.places)
+    assert np.linalg.norm(there - found.target.places, axis=1).max() < 0.01
+    assert found.taken is not None
+    assert found.taken.value >= 0.9 * matched.value
+
+
+def test_collections_refuse_closed_surfaces_by_name():
+    with pytest.raises(MeshError, match="'egg' is closed, and collections take open surfaces only"):
+        Chart.of(prepare(ball(400, name="egg"), FEW), 20)
 
 
 def test_closed_and_open_do_not_go_together():
