@@ -70,7 +70,7 @@ def store(obj: bpy.types.Object, surface: Surface, repair: Repair) -> None:
 
 
 def _line(surface: Surface, repair: Repair) -> Line:
-    mesh, changes = surface.mesh, 0
+    mesh, changes, tidy = surface.mesh, 0, None
     try:
         tidy = in_order(mesh, repair, surface.keys)
         mesh, changes = tidy.mesh, len(tidy.changes)
@@ -85,7 +85,7 @@ def _line(surface: Surface, repair: Repair) -> Line:
         return Line(refused, False)
     mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
     try:
-        mended += _held(tidy, repair)
+        mended += _held(tidy, repair) if tidy else ()
     except MeshError as error:
         return Line(_rows(str(error).removeprefix(f"'{mesh.name}' ")), False)
     if openings := len(found.boundary_loops) - 1:
