@@ -65,7 +65,7 @@ def test_what_was_mended_is_named_where_the_map_is_doubtful(
 ) -> None:
     pair = list(unlike)
     pair[side] = damage(undamaged(pair[side]), np.random.default_rng(4)).mesh
-    found = align(*pair, replace(QUICK, refine="mobius", samples=60, targets=400))
+    found = align(pair[0], pair[1], replace(QUICK, refine="mobius", samples=60, targets=400))
     assert any(said.startswith("doubtful: ") for said in found.warnings)
     assert kind in found.causes
     assert any(said.startswith(f"doubtful, perhaps because '{pair[side].name}' ") for said in found.warnings)
