@@ -435,9 +435,9 @@ class Clean:
         """Damage the source or the target, in the order given, and align."""
         rng = np.random.default_rng(seed)
         new = undamaged(self.source if side == "source" else self.target)
-        for damage in damages:
-            new = damage(new, rng)
         try:
+            for damage in damages:
+                new = damage(new, rng)
             own = prepare(new.mesh, self.settings, keys=new.keys)
             pair = (own, self.target) if side == "source" else (self.source, own)
             alignment = align(*pair, self.settings)
