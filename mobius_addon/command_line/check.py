@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
     from ...solver import MeshError, verdict
+    from ...solver.align.held import held
     from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name
     from ..mesh_data import read_surface
 
@@ -36,7 +37,10 @@ def run(options: argparse.Namespace) -> int:
             try:
                 require_places(imported)
                 surface = read_surface(imported.obj, name)
-                line = verdict(surface.mesh, keys=surface.keys).describe()
+                whole = verdict(surface.mesh, keys=surface.keys)
+                line = whole.describe()
+                if not whole.topology.is_closed and (badly := held(whole.tidy)):
+                    line += f"; {badly.text}"
             except Unreadable as error:
                 say_error(f"mobius: {error}")
                 status = UNUSABLE

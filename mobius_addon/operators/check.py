@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...solver import MeshError, Topology, TriangleMesh, topology, verdict
+from ...solver.align.held import Held, held
 from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
@@ -68,6 +69,15 @@ class MOBIUS_OT_check(bpy.types.Operator):
             line = f"'{obj.name}' cannot be used: it " + str(error).removeprefix(f"'{mesh.name}' ")
         else:
             line = f"'{obj.name}': {whole.describe()}"
+            badly = None
+            if not whole.topology.is_closed:
+                try:
+                    badly = held(whole.tidy, fill_holes=asked.fill_holes)
+                except MeshError as error:
+                    badly = Held("", "cannot be aligned: it " + str(error).removeprefix(f"'{mesh.name}' "))
+            if badly:
+                self.report({"WARNING"}, f"{line}; {badly.text}")
+                return {"FINISHED"}
             if not whole.repairs:
                 self.report({"INFO"}, line)
                 return {"FINISHED"}

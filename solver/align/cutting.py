@@ -104,7 +104,7 @@ def _piece_like(
     name = whole.original.name
     clock.begin("cut", "Looking where to cut", 0.0)
     mesh = whole.cleaned.mesh
-    hanging = necks(mesh, _width(other.flattening))
+    hanging = necks(mesh, width(other.flattening))
     pieces = sorted(hanging, key=lambda neck: _shape_difference(_submesh(mesh, neck), other.mesh))
     best: tuple[bool, float, Surface, Neck] | None = None
     for shortest, stage in ((True, clock.part(0.1, 0.5)), (False, clock.part(0.5, 1.0))):
@@ -143,7 +143,7 @@ def _piece_like(
     return best[2], (said,)
 
 
-def _width(flattening: Flat) -> float:
+def width(flattening: Flat) -> float:
     """Return the squared length of a surface's rim over its area."""
     rim = flattening.mesh.vertices[flattening.boundary]
     length = np.sqrt(((rim - np.roll(rim, 1, axis=0)) ** 2).sum(axis=1)).sum()

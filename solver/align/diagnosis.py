@@ -18,6 +18,14 @@ CROPPED = 0.3
 """Share of either surface without a counterpart from which on the map may well be wrong: up to 30 % cut from one scan
 all maps come out right, with 30 % cut from both 2 of 40 do not."""
 
+MENDED = {
+    "edge joined along which": ("slit", "is cut open along edges: see whether they belong together and merge them"),
+    "edges joined along which": ("slit", "is cut open along edges: see whether they belong together and merge them"),
+    "far off the surface put back": ("spike", "has vertices far off the surface: smooth or delete them"),
+    "cut through": ("handle", "has handles, as a cup has: cut through them and fill"),
+}
+"""What `surface.cleaned` says it has done, what kind of cause that is, and how it is told."""
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -26,7 +34,7 @@ class Cause:
     Attributes
     ----------
     kind : str
-        "coarse", "one way", "steps", "rough", "narrow", "deep", "cropped" or "unlike".
+        "coarse", "one way", "steps", "rough", "slit", "spike", "handle", "narrow", "deep", "cropped" or "unlike".
     text : str
         The cause, and after a colon what to do about it.
     """
@@ -82,6 +90,9 @@ def _of_surface(surface: Surface) -> list[Cause]:
     if any(said.startswith("coordinates in steps") for said in surface.cleaned.changes):
         text = f"'{name}' has coordinates too coarse for its details: move it to the origin before it is exported"
         result.append(Cause("steps", text))
+    for done, (kind, text) in MENDED.items():
+        if any(done in said for said in surface.cleaned.changes):
+            result.append(Cause(kind, f"'{name}' {text}"))
     if surface.mesh is not surface.cleaned.mesh:
         result.append(Cause("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     if surface.flattening.rim_lost > LITTLE:

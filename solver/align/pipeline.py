@@ -17,6 +17,7 @@ from .dense import bent_densely, drafted_from
 from .diagnosis import causes, coarse
 from .inside_out import turned_round
 from .landmarks import own_landmarks
+from .lips import with_lips_joined
 from .main_parts import other_mains
 from .mobius_map import roughly_aligned
 from .prepared import Surface
@@ -117,6 +118,7 @@ def _of_main_parts(
     source: Surface, target: Surface, settings: AlignSettings, clock: Part, landmarks: npt.ArrayLike | None
 ) -> tuple[Alignment, _Both]:
     """Return the alignment of the main parts of two surfaces, or of a piece of one of them, and what was aligned."""
+    source, target, joined = with_lips_joined(source, target)
     source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.1))
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
     found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
@@ -129,7 +131,7 @@ def _of_main_parts(
             found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
-    return replace(found, warnings=(*said, *found.warnings)), (source, target)
+    return replace(found, warnings=(*joined, *said, *found.warnings)), (source, target)
 
 
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:

@@ -126,7 +126,7 @@ class SurfacePoints:
 
     def _around(self, faces: Integers) -> Integers:
         """Return the faces next to faces, (q, k), as (q, 3 k); beyond a boundary the first again."""
-        around = self._neighbours[faces].reshape(len(faces), -1)
+        around = self._neighbours[faces].reshape(len(faces), 3 * faces.shape[1])
         return np.where(around < 0, faces[:, :1], around)
 
     def _nearest_among(

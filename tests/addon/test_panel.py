@@ -1,6 +1,7 @@
 """The panel: what it says of each mesh and of a result, that all it shows exists, presets, and other languages."""
 
 import json
+import math
 import string
 from pathlib import Path
 from types import SimpleNamespace
@@ -96,6 +97,22 @@ def test_the_line_under_a_picker() -> None:
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert lines(parts, largest_part=False) == ("2 separate parts:", "keep one, or turn on Largest Part")
     assert lines(parts) == ("disc, 28 vertices", "mended for the computation: 1")
+
+
+def test_what_a_disc_holds_badly_stands_there_before_it_is_aligned() -> None:
+    bands = {}
+    for length in (12, 20):
+        columns = 6 * length + 1
+        corners = [(i / 6, j / 6, 0.1 * math.sin(i / 3)) for j in range(7) for i in range(columns)]
+        starts = [j * columns + i for j in range(6) for i in range(columns - 1)]
+        quads = [(a, a + 1, a + columns + 1, a + columns) for a in starts]
+        bands[length] = make_object(f"Band {length}", corners, quads)
+    assert lines(bands[12]) == ("disc, 511 vertices", "long and narrow: less exact")
+    what, remedy = lines(bands[20])
+    assert what.startswith("is too long and narrow to be aligned in a disc")
+    assert remedy.startswith("cut it into pieces")
+    for band in bands.values():
+        assert bpy.ops.mobius.check(object_name=band.name, select=False) == {"FINISHED"}
 
 
 def test_an_edit_changes_the_line() -> None:

@@ -277,6 +277,38 @@ def inner_faces(old: Damaged, rng: np.random.Generator) -> Damaged:
     return _with(old, np.concatenate([mesh.faces, [[a, b, n]]]), top[None], np.array([-1]))
 
 
+def fins(old: Damaged, rng: np.random.Generator) -> Damaged:
+    """A wall of faces along a way over the surface, with three faces at each of its edges."""
+    way = _path(old.mesh, rng, 12)
+    if len(way) < 2:
+        return old
+    n, count = len(old.mesh.vertices), len(way)
+    up = np.linalg.norm(np.ptp(old.mesh.vertices[way], axis=0)) * 0.2 * rng.normal(size=3)
+    i = np.arange(count - 1)
+    wall = [np.stack([way[i], way[i + 1], n + i + 1], axis=1), np.stack([way[i], n + i + 1, n + i], axis=1)]
+    return _with(old, np.concatenate([old.mesh.faces, *wall]), old.mesh.vertices[way] + up, np.full(count, -1))
+
+
+def t_junctions(old: Damaged, rng: np.random.Generator) -> Damaged:
+    """Edges that are cut in two on one of their sides only."""
+    mesh, faces = old.mesh, old.mesh.faces.copy()
+    inner = np.flatnonzero(mesh.twins >= 0)
+    if not inner.size:
+        return old
+    more, middle, touched = [], [], set()
+    for side in rng.choice(inner, 12).tolist():
+        f, k = divmod(side, 3)
+        if f in touched or int(mesh.twins[side]) // 3 in touched:
+            continue
+        touched |= {f, int(mesh.twins[side]) // 3}
+        a, b, c = (int(faces[f][(k + j) % 3]) for j in (1, 2, 0))
+        name = len(mesh.vertices) + len(middle)
+        middle.append((mesh.vertices[a] + mesh.vertices[b]) / 2)
+        faces[f] = [c, a, name]
+        more.append([c, name, b])
+    return _with(old, np.concatenate([faces, np.array(more)]), np.array(middle), np.full(len(middle), -1))
+
+
 def inside_out(old: Damaged, rng: np.random.Generator) -> Damaged:
     """All faces turned round."""
     return _with(old, old.mesh.faces[:, [0, 2, 1]])
@@ -297,6 +329,17 @@ def spikes(old: Damaged, rng: np.random.Generator) -> Damaged:
     chosen = rng.choice(inside, 2, replace=False)
     vertices = old.mesh.vertices.copy()
     vertices[chosen] += rng.uniform(0.5, 20, (2, 1)) * old.mesh.diagonal * rng.choice([-1, 1], (2, 3))
+    return _moved(old, vertices)
+
+
+def rim_spikes(old: Damaged, rng: np.random.Generator) -> Damaged:
+    """Single vertices of the boundary far off."""
+    rim = np.setdiff1d(np.unique(old.mesh.faces), _inside(old.mesh))
+    if rim.size < 2:
+        return old
+    chosen = rng.choice(rim, 2, replace=False)
+    vertices = old.mesh.vertices.copy()
+    vertices[chosen] += rng.uniform(2, 20, (2, 1)) * old.mesh.diagonal * rng.choice([-1, 1], (2, 3))
     return _moved(old, vertices)
 
 
@@ -347,9 +390,12 @@ DAMAGES: tuple[Damage, ...] = (
     faces_without_area,
     duplicate_faces,
     inner_faces,
+    fins,
+    t_junctions,
     inside_out,
     some_turned,
     spikes,
+    rim_spikes,
     stray_vertices,
     debris,
     far_away,
@@ -389,9 +435,9 @@ class Clean:
         """Damage the source or the target, in the order given, and align."""
         rng = np.random.default_rng(seed)
         new = undamaged(self.source if side == "source" else self.target)
-        for damage in damages:
-            new = damage(new, rng)
         try:
+            for damage in damages:
+                new = damage(new, rng)
             own = prepare(new.mesh, self.settings, keys=new.keys)
             pair = (own, self.target) if side == "source" else (self.source, own)
             alignment = align(*pair, self.settings)

@@ -1,5 +1,6 @@
 """`check`: a line for each mesh."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,28 @@ def test_check_exits_1_for_what_can_be_no_disc_and_2_for_what_is_unreadable(
     assert status == 2
     assert err == f"mobius: there is no file '{scans / 'gone.obj'}'\n"
     assert len(out.splitlines()) == 1
+
+
+def band(length: int, rows: int = 7) -> str:
+    """An .obj file of a wavy band, so many times as long as wide."""
+    columns = (rows - 1) * length + 1
+    places = [(i / (rows - 1), j / (rows - 1)) for j in range(rows) for i in range(columns)]
+    corners = [(j * columns + i + 1, (j + 1) * columns + i + 1) for j in range(rows - 1) for i in range(columns - 1)]
+    lines = [f"v {x:.6f} {y:.6f} {0.1 * math.sin(2 * x):.6f}" for x, y in places]
+    return "\n".join([*lines, *(f"f {a} {a + 1} {b + 1} {b}" for a, b in corners)])
+
+
+def test_check_says_before_aligning_what_a_disc_holds_badly(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for length in (6, 12, 20):
+        (tmp_path / f"{length}.obj").write_text(band(length))
+    status, out, err = run(capsys, "check", *(tmp_path / f"{length}.obj" for length in (6, 12, 20)))
+    good, less, not_at_all = out.splitlines()
+    assert (status, err) == (1, "")
+    assert "narrow" not in good
+    assert ": disc, " in less
+    assert "; long and narrow: less exact, as angles are lost along " in less
+    assert "20.obj: cannot be used: it is too long and narrow to be aligned in a disc" in not_at_all
+    assert not_at_all.endswith("cut it into pieces that are at most ten times as long as wide")
 
 
 def test_check_prints_every_object_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

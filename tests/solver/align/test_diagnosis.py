@@ -1,7 +1,10 @@
 """A doubtful map names its likely cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from damages import Damage, handle, islands, rim_spikes, slit, spikes, undamaged
 from scans import bumps, posed
 
 from solver import AlignSettings, TriangleMesh, align, correspond, report
@@ -41,6 +44,32 @@ def test_two_things_that_are_not_alike_are_said_to_be() -> None:
     assert any(said.startswith("doubtful: ") for said in found.warnings)
     assert any("are these two of one kind?" in said for said in found.warnings)
     assert {"unlike", "one way"} <= set(found.causes)
+
+
+@pytest.fixture(scope="module")
+def unlike() -> tuple[TriangleMesh, TriangleMesh]:
+    """A dome and something else, between which all maps are doubtful."""
+    dome = bumps(900, seed=5)
+    waves = dome.vertices * [1, 1, 0]
+    waves[:, 2] = 0.1 * np.sin(11 * waves[:, 0]) * np.sin(9 * waves[:, 1])
+    return dome, TriangleMesh(waves, dome.faces, "waves")
+
+
+@pytest.mark.parametrize(
+    ("damage", "kind"),
+    [(slit, "slit"), (islands, "slit"), (spikes, "spike"), (rim_spikes, "spike"), (handle, "handle")],
+)
+@pytest.mark.parametrize("side", [0, 1])
+def test_what_was_mended_is_named_where_the_map_is_doubtful(
+    unlike: tuple[TriangleMesh, TriangleMesh], damage: Damage, kind: str, side: int
+) -> None:
+    pair = list(unlike)
+    pair[side] = damage(undamaged(pair[side]), np.random.default_rng(4)).mesh
+    found = align(pair[0], pair[1], replace(QUICK, refine="mobius", samples=60, targets=400))
+    assert any(said.startswith("doubtful: ") for said in found.warnings)
+    assert kind in found.causes
+    assert any(said.startswith(f"doubtful, perhaps because '{pair[side].name}' ") for said in found.warnings)
+    assert kind not in align(*unlike, replace(QUICK, refine="mobius", samples=60, targets=400)).causes
 
 
 def test_a_sure_map_names_no_cause() -> None:

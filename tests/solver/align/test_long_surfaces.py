@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from solver import AlignSettings, MeshError, TriangleMesh, align, correspond, flatten
+from solver import AlignSettings, MeshError, TriangleMesh, align, correspond, flatten, verdict
+from solver.align.held import held
 
 
 def belt(length: int, rows: int) -> TriangleMesh:
@@ -67,3 +68,18 @@ def test_too_few_vertices_inside_are_refused_by_name() -> None:
     for source, target in ((one, belt(4, 5)), (belt(4, 5), one), (belt(8, 2), belt(8, 2))):
         with pytest.raises(MeshError, match=r"^'(One|Belt)' has 0 vertices inside its boundary"):
             align(source, target)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "kind"), [(belt(8, 7), None), (belt(12, 7), "narrow"), (tube(6), None), (tube(60), "deep")]
+)
+def test_what_a_disc_holds_badly_is_known_before(mesh: TriangleMesh, kind: str | None) -> None:
+    found = held(verdict(mesh).tidy)
+    assert (found.kind if found else None) == kind
+
+
+@pytest.mark.parametrize("mesh", [belt(14, 7), belt(200, 4), tube(150), tube(400)])
+def test_what_no_disc_holds_is_refused_before(mesh: TriangleMesh) -> None:
+    tidy = verdict(mesh).tidy
+    with pytest.raises(MeshError, match=r"too (long and narrow to be aligned in|deep or too long for) a disc.*: cut"):
+        held(tidy)

@@ -91,3 +91,10 @@ def test_points_on_a_boundary_are_named(surface):
     assert surface.at(*surface.most_alike(outside, normals[loop]))[2].mean() > 0.95
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), loop)
     assert not surface.at(*surface.most_alike(mesh.vertices[inner], normals[inner]))[2].any()
+
+
+def test_of_no_points_none_is_nearest(surface):
+    """As where parts that ride along share all their vertices with others."""
+    face, weights = surface.nearest_point(np.empty((0, 3)), np.empty((0, 3)))
+    assert face.shape == (0,)
+    assert weights.shape == (0, 3)

@@ -1,5 +1,6 @@
 """Meshes with flaws, put in order: what is joined and what stays apart, and how that is told on the mesh as it came."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -219,6 +220,23 @@ def test_spikes_are_put_back_and_cones_stay(sheet: TriangleMesh) -> None:
     fan = np.stack([np.arange(k), (np.arange(k) + 1) % k, np.full(k, k)], axis=1)
     cone = TriangleMesh(np.concatenate([around, [[0, 0, 12]]]), fan, "Cone")
     assert cleaned(cone).mesh is cone
+
+
+def test_thin_triangles_among_thin_ones_are_no_spikes(real_mesh: Callable[[str], TriangleMesh]) -> None:
+    """Ears cut out of heads have rims of long thin triangles."""
+    for number in (6, 7, 8):
+        for side in "ab":
+            mesh = real_mesh(f"bodyparts/ear_{number}_{side}.obj")
+            assert not any("far off" in said for said in cleaned(mesh).changes)
+
+
+def test_a_spike_of_the_rim_is_put_back(sheet: TriangleMesh) -> None:
+    rim = sheet.edges[np.bincount(sheet.edge_of_side, minlength=len(sheet.edges)) == 1]
+    vertices = sheet.vertices.copy()
+    vertices[rim[3, 0]] += 5 * sheet.diagonal
+    found = cleaned(TriangleMesh(vertices, sheet.faces, "Sheet"))
+    assert found.changes == ("1 vertex far off the surface put back",)
+    assert np.linalg.norm(found.mesh.vertices - sheet.vertices, axis=1).max() < 0.05 * sheet.diagonal
 
 
 def test_a_mesh_far_away_in_single_precision_is_said_to_be_coarse(sheet: TriangleMesh) -> None:
