@@ -248,10 +248,9 @@ def test_a_cropped_face_is_found_on_another_persons(real_mesh):
     assert found.matched[has].mean() > 0.95
 
 
-@pytest.mark.parametrize("names", [("T14", "x17"), ("x17", "T14")])
-def test_what_may_only_be_stretched_is_not_missing_without_a_word(real_mesh, names):
+def test_what_may_only_be_stretched_is_not_missing_without_a_word(real_mesh):
     """Teeth of two genera: a landmark on the one's edge has its counterpart well within the other's."""
-    source, target = (real_mesh(f"teeth/{name}.obj") for name in names)
+    source, target = (real_mesh(f"teeth/{name}.obj") for name in ("T14", "x17"))
     alignment = align(source, target)
     assert any(warning.startswith("partial overlap: ") for warning in alignment.warnings)
     assert DOUBTFUL < alignment.mean_confidence < FITS
