@@ -21,7 +21,7 @@ from .lips import with_lips_joined
 from .main_parts import other_mains
 from .mobius_map import roughly_aligned
 from .prepared import Surface
-from .reconsider import DOUBTFUL, reconsidered
+from .reconsider import DOUBTFUL, FITS, reconsidered
 from .settings import AlignSettings
 
 
@@ -77,6 +77,12 @@ def align(
         likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
         kinds = tuple(cause.kind for cause in known)
         return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
+    if found.mean_confidence < FITS and any(said.startswith("partial overlap: ") for said in found.warnings):
+        said = (
+            "unsure: what the surfaces have in common fits less well than it should, so what is said to be missing may "
+            "only be stretched: look along its edge, or mark points there"
+        )
+        found = replace(found, warnings=(*found.warnings, said))
     cause = coarse(found)
     return found if cause is None else replace(found, warnings=(*found.warnings, cause.text), causes=(cause.kind,))
 

@@ -64,7 +64,7 @@ def line(row: Row) -> str:
         said.append("WRONG SIDE")
     if facts.get("unfolded", 0) >= 0.005:
         said.append(f"{100 * facts['unfolded']:.0f} % UNBENT")
-    told = ("ambiguous", "doubtful", "reconsidered")
+    told = ("ambiguous", "doubtful", "reconsidered", "unsure")
     said += [" ".join(w.split()[:2]).split(":")[0] for w in facts.get("warnings", ()) if w.startswith(told)]
     if facts.get("margin") is not None:
         said.append(f"side {facts['margin']:+.3f}, value {facts['value']:.1f}")

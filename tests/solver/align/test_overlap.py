@@ -11,6 +11,7 @@ from surfaces import planar, rings
 from solver import AlignSettings, Progress, TriangleMesh, align, correspond, flatten, report, topology
 from solver.align.overlap import depth_beyond, piece
 from solver.align.pieces import _surely_better
+from solver.align.reconsider import DOUBTFUL, FITS
 from solver.flatten.distortion import signed_areas
 from solver.surface.nearest import SurfacePoints
 
@@ -245,3 +246,24 @@ def test_a_cropped_face_is_found_on_another_persons(real_mesh):
     assert percent(places(found, part.mesh), source.vertices[vertex], source)[has].mean() < 0.5
     assert found.matched[~has].mean() < 0.1
     assert found.matched[has].mean() > 0.95
+
+
+def test_what_may_only_be_stretched_is_not_missing_without_a_word(real_mesh):
+    """Teeth of two genera: a landmark on the one's edge has its counterpart well within the other's."""
+    source, target = (real_mesh(f"teeth/{name}.obj") for name in ("T14", "x17"))
+    alignment = align(source, target)
+    assert any(warning.startswith("partial overlap: ") for warning in alignment.warnings)
+    assert DOUBTFUL < alignment.mean_confidence < FITS
+    assert any(warning.startswith("unsure: ") for warning in alignment.warnings)
+
+
+def test_what_is_surely_missing_is_said_to_be(real_mesh):
+    source = real_mesh("faces_simpop/SIMPOP_01.obj")
+    face = source.vertices[source.faces].mean(axis=1)
+    axis = np.linalg.svd(source.vertices - source.vertices.mean(axis=0), full_matrices=False)[2][0]
+    kept = source.faces[face @ axis > np.quantile(face @ axis, 0.2)]
+    used, corners = np.unique(kept, return_inverse=True)
+    part = TriangleMesh(source.vertices[used], corners.reshape(-1, 3), "part")
+    alignment = align(source, part)
+    assert alignment.overlap is not None
+    assert not any(warning.startswith("unsure: ") for warning in alignment.warnings)
