@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...surface.mesh import Booleans, Floats, Integers
+from ...surface.walking import STEPS, nearest_from
 from .carrying import Carrying
 from .picture import Picture
 
@@ -29,8 +30,8 @@ INSIDE = 1e-9
 DEPTH = 0.01
 """Islands, or triangles, that overlap by less, in texels, only touch: the rounding of float32 UVs in 8192 texels."""
 
-STEPS = 4096
-"""Of one walk at most, over a source of any size that one triangle of the target may span."""
+TRACE = 0.25
+"""Of a byte: how much a texel counts that cannot be seen. Beside one that can it is next to nothing."""
 
 _CANDIDATES = 1 << 19
 """Texels looked at in one go."""
@@ -151,6 +152,10 @@ def _place(carrying: Carrying, layout: Floats, result: npt.NDArray[Any], rows: I
         other = _walk(carrying, carrying.at[vertex[again, k]], point[again], normal[again])
         better = other[2] < outside[again]
         face[again[better]], place[again[better]], outside[again[better]] = (x[better] for x in other)
+    lost = np.flatnonzero((outside > INSIDE) | _astray(carrying, face, place, point, vertex))
+    if len(lost):
+        at = carrying.at[vertex[lost]]
+        face[lost], place[lost], _ = nearest_from(carrying.source, carrying.beyond, at, point[lost])
     result["face"][rows], result["place"][rows] = face, place[:, 1:]
     corners = layout[triangle]
     sides = corners[:, [1, 2, 0]] - corners[:, [2, 0, 1]]
@@ -203,6 +208,13 @@ def _walk(carrying: Carrying, start: Integers, point: Floats, normal: Floats) ->
     return face, place / place.sum(axis=1, keepdims=True), outside
 
 
+def _astray(carrying: Carrying, face: Integers, place: Floats, point: Floats, vertex: Integers) -> Booleans:
+    """Return which places on faces are farther from points than the farthest of the places that these lie between."""
+    found = np.einsum("qk,qkd->qd", place, carrying.source.vertices[carrying.source.faces[face]])
+    reach = ((carrying.place[vertex] - point[:, None]) ** 2).sum(axis=2).max(axis=1)
+    return ((found - point) ** 2).sum(axis=1) > reach
+
+
 def sample(
     picture: Picture,
     given: npt.NDArray[Any],
@@ -216,8 +228,11 @@ def sample(
     """Write the mean of a picture over each of some texels, (n,), whose face is on the wanted page, into (n, channels).
 
     The mean is that of bilinear values at a grid of points over the texel's image in the picture, one to each of the
-    picture's texels along its two sides, `limit` at most. Of the picture only texels count that are labelled as the
-    face's island, if there are any.
+    picture's texels along its two sides, `limit` at most. A texel of the picture is a mean over its own width already,
+    and variances of filters add: over a side of L texels what is left is a mean over sqrt(L^2 - 1), of as many points.
+    Bilinear are the bytes, as in renderers that decode what they have read: steps of sRGB look alike, those of light do
+    not, and between dark and bright the middle of the light looks bright. Means over areas are means of light. Of the
+    picture only texels count that are labelled as the face's island, if there are any, each as much as it is opaque.
 
     Parameters
     ----------
@@ -244,7 +259,8 @@ def sample(
 
     middle, across, down = own[:, 0] + moved("place"), moved("across"), moved("down")
     label = island[face] if picture.label is not None else np.zeros(len(face), np.uint16)
-    steps = [np.clip(np.ceil(np.linalg.norm(x, axis=1) - 0.05), 1, limit).astype(int) for x in (across, down)]
+    wide = [np.sqrt(np.maximum((x**2).sum(axis=1) - 1, 0)) for x in (across, down)]
+    steps = [np.clip(np.ceil(x), 1, limit).astype(int) for x in wide]
     sums, total = np.zeros((len(rows), out.shape[1])), np.zeros(len(rows))
     for a in range(steps[0].max()):
         for b in range(steps[1].max()):
@@ -276,9 +292,12 @@ def _bilinear(picture: Picture, at: Floats, own: npt.NDArray[np.uint16]) -> tupl
             if picture.label is not None:
                 right |= there & (picture.label[row, column] == own)
             weight = np.where(right, weight, 0)
+            if picture.opaque is not None:
+                weight = np.where(there, weight * ((picture.opaque[row, column] + TRACE) / 255), weight)
             total += weight
-            sums += np.where(there, weight, 0)[:, None] * picture.values(picture.pixels[row, column])
-    return sums, total
+            sums += np.where(there, weight, 0)[:, None] * picture.pixels[row, column]
+    mean = np.divide(sums, total[:, None], out=np.zeros_like(sums), where=total[:, None] > 0)
+    return total[:, None] * picture.values(mean), total
 
 
 def wrapped(index: Integers, size: int, wrap: int) -> tuple[Integers, Booleans]:
