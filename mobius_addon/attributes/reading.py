@@ -11,7 +11,8 @@ import numpy as np
 from ...solver import Cancelled, Progress
 from ...solver.surface.mesh import Floats
 from ..mesh_data import Refusal
-from ..textures.reading import TextureReading, read_textures
+from ..textures.carrying import TextureReading
+from ..textures.reading import read_textures
 from .access import MAX_UV_MAPS, Layer
 from .carrier import Carrier, Values
 from .chosen import chosen_layers

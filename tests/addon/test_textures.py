@@ -170,6 +170,32 @@ def test_packed_channels_and_alpha(sheets: tuple[Any, Any]) -> None:
     )
 
 
+@pytest.mark.parametrize("floats", [False, True])
+def test_transparent_texels_give_no_color_to_those_beside_them(sheets: tuple[Any, Any], floats: bool) -> None:
+    """Cards of hair: white lines of one texel on black that cannot be seen."""
+    source, target = sheets
+    hair = np.zeros((SIZE, SIZE, 4), np.float32)
+    hair[:, ::4] = 1
+    if floats:
+        image = new_image("Hair", {1001: hair}, "Linear Rec.709")
+        image.alpha_mode = "PREMUL"
+    else:
+        image = new_image("Hair", {1001: (255 * hair).astype(np.uint8)}, "sRGB")
+    made = material("Hair", Base_Color=image)
+    tree = made.node_tree
+    node = next(node for node in tree.nodes if node.type == "TEX_IMAGE")
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+    source.data.materials.append(made)
+    carry(source, target, size=96)
+    found = shown(target, "Base Color")
+    scale = 1 if floats else 255
+    seen = found[:, :, 3] > 0.03 * scale
+    assert 0.3 < seen.mean() < 0.8
+    assert found[:, :, 3][seen].min() < 0.5 * scale
+    assert found[:, :, :3][seen].min() > 0.95 * scale
+
+
 def test_several_materials_and_tiles_become_one(sheets: tuple[Any, Any]) -> None:
     source, target = sheets
     left, right = smooth(3, 3), smooth(3, 4)

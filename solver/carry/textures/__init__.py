@@ -8,7 +8,7 @@ read there, at the source's own UV.
 from .carrying import Carrying
 from .exr import exr_bytes
 from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
-from .normal_maps import FLAT, TangentFrames, TurnedNormals
+from .normal_maps import FLAT, KeptTurns, TangentFrames, TurnedNormals, Turns
 from .paints import FromCorners, FromPictures, OnTarget, Paint, Stacked, Together
 from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
 from .png import png_bytes
@@ -25,6 +25,7 @@ __all__ = [
     "FromCorners",
     "FromPictures",
     "InLayout",
+    "KeptTurns",
     "LayoutError",
     "MapPaint",
     "OnTarget",
@@ -36,6 +37,7 @@ __all__ = [
     "Together",
     "TransferMap",
     "TurnedNormals",
+    "Turns",
     "Wanted",
     "at_vertices",
     "encoded",
