@@ -218,6 +218,7 @@ GERMAN = {
     "Not certified: gap {:.2f}": "Nicht bewiesen: Lücke {:.2f}",
     "Not the best match: gap {:.2f}": "Nicht die beste: Lücke {:.2f}",
     "Nothing is being computed": "Es wird nichts berechnet",
+    "No preview of the textures: {}": "Keine Vorschau der Texturen: {}",
     "Nothing is shown side by side": "Nichts wird nebeneinander gezeigt",
     "Object": "Objekt",
     "Of the vertex groups, carry those that belong to a deforming bone of an armature of either mesh": "Von den Vertex-Gruppen die übertragen, die zu einem verformenden Knochen einer Armatur eines der Meshes gehören",

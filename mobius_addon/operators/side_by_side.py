@@ -7,15 +7,18 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
-from ...solver import MeshError
+from ...solver import Correspondence, MeshError
 from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Floats
 from .. import stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..mesh_data import Refusal, read_surface, seen_positions
+from ..options import transfer_settings
 from ..results import pattern_color, read_layout, require_room, write_color
+from ..textures.preview import is_preview_of, preview_settings, remove_preview, show_preview
 from ..textures.writing import has_pictures
 from ..usable import why_not_aligned
+from .transfer import read_through
 
 COLLECTION = "Mobius Side by Side"
 
@@ -72,10 +75,24 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
             obj.select_set(obj in copies)
         context.view_layer.objects.active = copies[1]
         viewport.show_colors(context)
-        if has_pictures(target):
+        if has_pictures(target) or self._preview(context, copies[1], surfaces, found):
             viewport.show_materials(context)
         viewport.look_at_selected_alone(context, np.concatenate([places[0], posed + right * step]))
         return {"FINISHED"}
+
+    def _preview(
+        self, context: bpy.types.Context, copy: bpy.types.Object, surfaces: Any, found: Correspondence
+    ) -> bool:
+        """Show on the copy of the target what a transfer of textures would; return whether there is any."""
+        settings = preview_settings(transfer_settings(context.scene.mobius))
+        if settings is None:
+            return False
+        source, target = context.scene.mobius.source, context.scene.mobius.target
+        try:
+            return show_preview(copy, read_through(source, target, surfaces, found, settings).carry())
+        except (Refusal, MeshError) as error:
+            self.report({"WARNING"}, rpt_("No preview of the textures: {}").format(error))
+            return False
 
 
 class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
@@ -121,7 +138,13 @@ def end(context: bpy.types.Context) -> None:
 def end_for(mesh: bpy.types.Mesh) -> bool:
     """Remove the copies from every scene that shows this mesh side by side, and return whether there were any."""
     shown = [scene.collection.children.get(COLLECTION) for scene in bpy.data.scenes]
-    found = {x for x in shown if x is not None and x.is_editable and any(obj.data == mesh for obj in x.objects)}
+    found = {
+        x
+        for x in shown
+        if x is not None
+        and x.is_editable
+        and any(obj.data == mesh or is_preview_of(obj.data, mesh.name) for obj in x.objects)
+    }
     for collection in found:
         _remove(collection)
     return bool(found)
@@ -129,7 +152,9 @@ def end_for(mesh: bpy.types.Mesh) -> bool:
 
 def _remove(collection: bpy.types.Collection) -> None:
     for obj in list(collection.objects):
+        mesh = obj.data
         bpy.data.objects.remove(obj)
+        remove_preview(mesh)
     bpy.data.collections.remove(collection)
 
 

@@ -366,3 +366,59 @@ def test_the_operator_carries_pictures(pair: tuple[Any, Any]) -> None:
     assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}) == {"FINISHED"}
     assert shown(target, "Base Color").shape[2] == 4
     assert [x.name for x in target.data.uv_layers if x.active_render] == ["UVMap"]
+
+
+def test_side_by_side_previews_the_pictures_before_they_are_transferred(pair: tuple[Any, Any]) -> None:
+    """On a copy with a mesh of its own: the target stays as it was, and the end takes everything away."""
+    source, target = pair
+    picture = smooth()
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    settings = bpy.context.scene.mobius
+
+    def counts() -> tuple[int, ...]:
+        return tuple(len(x) for x in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.images))
+
+    before = counts()
+    settings.kinds = {"UV"}
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert bpy.data.collections["Mobius Side by Side"].objects[1].data == target.data
+    settings.kinds = {"UV", "TEXTURES"}
+    uv_maps = [x.name for x in target.data.uv_layers]
+    for _ in range(2):
+        assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+        copy = bpy.data.collections["Mobius Side by Side"].objects[1]
+        assert copy.data != target.data
+        seen = shown(copy, "Base Color")
+        assert seen.shape[:2] == (1024, 1024)
+        assert not target.material_slots
+        assert [x.name for x in target.data.uv_layers] == uv_maps
+        assert counts() == (before[0] + 2, *(x + 1 for x in before[1:]))
+    # what is transferred shows the same, in another size
+    settings.texture_size = 512
+    assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}, texture_size=512) == {"FINISHED"}
+    given = shown(target, "Base Color")
+    assert np.abs(seen.reshape(512, 2, 512, 2, 4).mean(axis=(1, 3)) - given)[given[:, :, 3] > 0].mean() < 4
+    assert bpy.ops.mobius.end_side_by_side() == {"FINISHED"}
+    assert counts() == (before[0], before[1], before[2] + 1, before[3] + 1)
+    # and Clear ends it too
+    for block in (target.data.materials[0], next(x for x in bpy.data.images if "mobius_textures" in x)):
+        (bpy.data.materials if isinstance(block, bpy.types.Material) else bpy.data.images).remove(block)
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert counts()[1] == before[1] + 1
+    bpy.context.view_layer.objects.active = target
+    assert bpy.ops.mobius.clear() == {"FINISHED"}
+    assert counts()[1:] == before[1:]
+
+
+def test_a_preview_that_cannot_be_is_a_warning(pair: tuple[Any, Any], tmp_path: Path) -> None:
+    source, target = pair
+    gone = bpy.data.images.new("Gone", 4, 4)
+    gone.source, gone.filepath = "FILE", str(tmp_path / "gone.png")
+    source.data.materials.append(material("Skin", Base_Color=gone))
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    bpy.context.scene.mobius.kinds = {"TEXTURES"}
+    meshes = len(bpy.data.meshes)
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert bpy.data.collections["Mobius Side by Side"].objects[1].data == target.data
+    assert len(bpy.data.meshes) == meshes
