@@ -13,6 +13,7 @@ from mobius_extension.mobius_addon.attributes import Carrier, TransferSettings, 
 from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
 from mobius_extension.mobius_addon.textures.by_map import textures_by_map  # noqa: E402
 from mobius_extension.mobius_addon.textures.images import new_image, read_tiles  # noqa: E402
+from mobius_extension.mobius_addon.textures.nodes import picture_count  # noqa: E402
 from mobius_extension.mobius_addon.textures.reading import read_textures  # noqa: E402
 from mobius_extension.mobius_addon.textures.settings import TextureSettings  # noqa: E402
 from mobius_extension.solver import Correspondence  # noqa: E402
@@ -522,3 +523,20 @@ def test_a_preview_that_cannot_be_is_a_warning(pair: tuple[Any, Any], tmp_path: 
     assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
     assert bpy.data.collections["Mobius Side by Side"].objects[1].data == target.data
     assert len(bpy.data.meshes) == meshes
+
+
+def test_the_panel_counts_the_pictures(sheets: tuple[Any, Any]) -> None:
+    source, _ = sheets
+    assert picture_count(source) == 0
+    layer = source.data.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
+    source.data.attributes.default_color_name = layer.name
+    assert picture_count(source) == 1
+    first = new_image("One", {1001: smooth()}, "sRGB")
+    source.data.materials.append(material("Skin", Base_Color=first, Emission_Color=first))
+    assert picture_count(source) == 1
+    group = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    group.nodes.new("ShaderNodeTexImage").image = new_image("Two", {1001: smooth()}, "sRGB")
+    made = material("Other")
+    made.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+    source.data.materials.append(made)
+    assert picture_count(source) == 2

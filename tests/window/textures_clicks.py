@@ -32,7 +32,8 @@ def steps() -> Wait:
     before = state(names)
 
     assert bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True) == {"FINISHED"}
-    yield from picture("textures-preview", 4.0)
+    # the engine that draws materials compiles its shaders first
+    yield from picture("textures-preview", 30.0)
     assert state(names)["target"] == before["target"], "a preview has changed the target"
     assert bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True) == {"FINISHED"}
     yield 0.5
@@ -58,7 +59,7 @@ def steps() -> Wait:
     yield from click_on(transfer)
     yield from until(lambda: Job.current is None and state(names) != before)
     bpy.context.space_data.shading.type = "MATERIAL"
-    yield from picture("textures-transferred", 6.0)
+    yield from picture("textures-transferred", 30.0)
     after = state(names)
     assert after["images"] == before["images"] + 1
     made = bpy.data.objects[names[1]].material_slots[0].material
