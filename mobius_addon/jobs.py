@@ -133,6 +133,11 @@ class JobOperator:
         """Write the result and report it. May raise `Refusal`, before it writes."""
         raise NotImplementedError
 
+    @property
+    def is_persons(self) -> bool:
+        """Whether a person called it in a window and looks on, not a script or the redo panel."""
+        return not bpy.app.background and self.options.is_invoke and not self.options.is_repeat
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Do the work: at once for a script and for the redo panel, in the background for a person."""
         self._scene = context.scene.session_uid

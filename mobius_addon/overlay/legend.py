@@ -8,13 +8,12 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from gpu_extras.batch import batch_for_shader
 
-from .. import stored_alignment
-from ..heat_maps import MAP_MEASURES, Measure, measure, shown_by
+from ..heat_maps import Measure, shown_by
 from .drawing import floats, free_corner, opaque, write
 
 
 def legends(context: bpy.types.Context) -> list[Measure]:
-    """Return what needs a legend in this 3D viewport: colors that are shown, and lines that are drawn."""
+    """Return what needs a legend in this 3D viewport: the colors that are shown."""
     view = context.window_manager.mobius_view
     found: list[Measure] = []
     shading = context.space_data.shading
@@ -23,9 +22,6 @@ def legends(context: bpy.types.Context) -> list[Measure]:
             if obj is not None and obj.type == "MESH":
                 shown = shown_by(obj.data.attributes.active_color_name or "")
                 found += [shown] if shown and shown not in found else []
-    confidence = measure("confidence", MAP_MEASURES)
-    if view.matches and confidence not in found and stored_alignment.pair(context):
-        found.append(confidence)
     return found
 
 

@@ -12,6 +12,7 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import overlay, results  # noqa: E402
 from mobius_extension.mobius_addon.attributes import OWN_NAMES, PATTERN_COLOR  # noqa: E402
+from mobius_extension.mobius_addon.comparison import COLLECTION  # noqa: E402
 from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     DISC_MEASURES,
     LARGEST_FACTOR,
@@ -20,7 +21,6 @@ from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     shown_by,
     vertex_dilatations,
 )
-from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION  # noqa: E402
 from mobius_extension.mobius_addon.overlay.matches import chosen_matches  # noqa: E402
 from mobius_extension.solver import Correspondence, TriangleMesh  # noqa: E402
 from mobius_extension.solver.carry.fitted import similarity  # noqa: E402
@@ -171,9 +171,9 @@ def test_handlers_are_there_only_while_something_is_drawn(aligned: tuple[Any, An
     view = bpy.context.window_manager.mobius_view
     assert set(overlay._handles) == set()
     view.matches = True
-    assert set(overlay._handles) == {"matches", "legend"}
+    assert set(overlay._handles) == {"matches"}
     view.discs = True
-    assert set(overlay._handles) == {"matches", "legend", "discs", "names"}
+    assert set(overlay._handles) == {"matches", "discs", "names"}
     view.matches = view.discs = False
     assert set(overlay._handles) == set()
     view.legend = True
@@ -196,7 +196,7 @@ def test_unregistering_removes_the_handlers() -> None:
 
 def test_the_legend_tells_what_is_shown(aligned: tuple[Any, Any]) -> None:
     shading = SimpleNamespace(type="SOLID", color_type="VERTEX")
-    view = SimpleNamespace(legend=True, matches=False)
+    view = SimpleNamespace(legend=True)
     context: Any = SimpleNamespace(
         space_data=SimpleNamespace(shading=shading),
         window_manager=SimpleNamespace(mobius_view=view),
@@ -206,11 +206,7 @@ def test_the_legend_tells_what_is_shown(aligned: tuple[Any, Any]) -> None:
     assert overlay.legends(context) == []
     bpy.ops.mobius.heat_map(measure="factor")
     assert [x.identifier for x in overlay.legends(context)] == ["factor"]
-    view.matches = True
-    assert [x.identifier for x in overlay.legends(context)] == ["factor", "confidence"]
     shading.color_type = "MATERIAL"  # the colors are not seen
-    assert [x.identifier for x in overlay.legends(context)] == ["confidence"]
-    bpy.context.scene.mobius.source = None
     assert overlay.legends(context) == []
 
 

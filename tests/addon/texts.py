@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 TRANSLATED = {"iface_", "rpt_", "n_"}
@@ -13,16 +14,19 @@ def of_classes() -> set[str]:
     import bpy
 
     found: set[str] = set()
-    owners = [
+    owners: list[Any] = [
         getattr(bpy.ops.mobius, name).get_rna_type() for name in dir(bpy.ops.mobius) if not name.endswith("preset_add")
     ]
     for rna in owners:
         found |= {rna.name, rna.description}
     for owner, name in ((bpy.types.Scene, "mobius"), (bpy.types.WindowManager, "mobius_view")):
         owners.append(owner.bl_rna.properties[name].fixed_type)
+    owners.append(bpy.types.Scene.bl_rna.properties["mobius"].fixed_type.properties["proof"].fixed_type)
+    if addon := next((x for x in bpy.types.AddonPreferences.__subclasses__() if x.__name__.startswith("MOBIUS")), None):
+        owners.append(addon.bl_rna)
     for rna in owners:
         for prop in rna.properties:
-            if prop.identifier not in ("rna_type", "name"):
+            if prop.identifier not in ("rna_type", "name", "bl_idname"):
                 found |= {prop.name, prop.description}
                 found |= {text for item in getattr(prop, "enum_items", ()) for text in (item.name, item.description)}
     found |= {getattr(bpy.types, name).bl_label for name in dir(bpy.types) if name.startswith("MOBIUS_PT_")}
