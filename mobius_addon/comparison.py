@@ -12,6 +12,29 @@ _ROLE = "mobius_role"
 """Custom property of a copy: "source" or "target"."""
 
 
+def is_copy(obj: bpy.types.Object) -> bool:
+    """Return whether an object is one of the copies, which nobody should work on."""
+    return _ROLE in obj
+
+
+def remember_selection(context: bpy.types.Context) -> None:
+    """Keep which objects are selected and active, by name, in the collection of the comparison."""
+    collection = context.scene.collection.children[COLLECTION]
+    active = context.view_layer.objects.active
+    collection["selected"] = [obj.name for obj in context.view_layer.objects if obj.select_get() and not is_copy(obj)]
+    collection["active"] = "" if active is None or is_copy(active) else active.name
+
+
+def _select_as_before(context: bpy.types.Context) -> None:
+    """Select what was selected before the copies were, of what is still there."""
+    collection, objects = context.scene.collection.children[COLLECTION], context.view_layer.objects
+    names = [name for name in collection.get("selected", ()) if name in objects]
+    active = collection.get("active", "")
+    for obj in objects:
+        obj.select_set(obj.name in names)
+    objects.active = objects.get(active)
+
+
 def is_shown(context: bpy.types.Context) -> bool:
     """Return whether the scene holds a comparison, whole or what is left of one."""
     return COLLECTION in context.scene.collection.children
@@ -27,6 +50,7 @@ def copies(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Obje
 def end(context: bpy.types.Context) -> None:
     """Remove the copies, if there are any; the meshes stay."""
     if is_shown(context):
+        _select_as_before(context)
         _remove(context.scene.collection.children[COLLECTION])
 
 

@@ -425,7 +425,7 @@ GERMAN = {
     "How probable it is, on average over the target, that a point is less than 2 % of the source's size off; 0 where there is no counterpart": "Wie wahrscheinlich es im Mittel über das Ziel ist, dass ein Punkt um weniger als 2 % der Größe der Quelle danebenliegt; 0, wo es kein Gegenstück gibt",
     "Matched value and proven bound of the search among what both show, which decides where it was made": "Zugeordneter Wert und bewiesene Schranke der Suche in dem, was beide zeigen; wo es sie gab, entscheidet sie",
     "Mean Confidence": "Mittlere Sicherheit",
-    "Mean error about {} ({:.1%} of the size)": "Mittlerer Fehler etwa {} ({:.1%} der Größe)",
+    "Mean error about {} ({:.1%})": "Mittlerer Fehler etwa {} ({:.1%})",
     "Not sure everywhere": "Nicht überall sicher",
     "Nothing": "Nichts",
     "Other Orientation": "Andere Orientierung",
@@ -448,4 +448,7 @@ GERMAN = {
     "{} (side by side)": "{} (nebeneinander)",
     "{} (side by side, mirrored)": "{} (nebeneinander, gespiegelt)",
     "Trying another map": "Eine andere Abbildung versuchen",
+    "'{}' is a copy of Side by Side: choose the object that it shows": "„{}“ ist eine Kopie von Nebeneinander: Das Objekt wählen, das sie zeigt",
+    "about {} s left": "noch etwa {} s",
+    "about {} min left": "noch etwa {} min",
 }

@@ -8,6 +8,7 @@ draws.
 import bpy
 
 from . import overlay
+from .comparison import is_copy
 from .live import samplable
 from .options import AlignOptions, ScanOptions, TransferOptions
 from .proof import MobiusProof
@@ -15,7 +16,7 @@ from .usable import is_in_scene
 
 
 def _is_choosable(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH" and is_in_scene(obj, settings.id_data)
+    return obj.type == "MESH" and not is_copy(obj) and is_in_scene(obj, settings.id_data)
 
 
 def _names_to_sample(settings: bpy.types.PropertyGroup, _context: bpy.types.Context, _typed: str) -> list[str]:

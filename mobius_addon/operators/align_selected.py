@@ -11,6 +11,7 @@ from ... import solver
 from ...solver.surface.mesh import Booleans
 from .. import landmarks, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
+from ..comparison import is_copy
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
@@ -35,7 +36,7 @@ class _Target:
 def selected_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Return the selected meshes but the source, in alphabetical order."""
     source = context.scene.mobius.source
-    chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source]
+    chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source and not is_copy(obj)]
     return sorted(chosen, key=lambda obj: obj.name)
 
 

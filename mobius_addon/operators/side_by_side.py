@@ -8,7 +8,7 @@ from mathutils import Matrix
 from ...solver import Correspondence, MeshError
 from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Floats
-from .. import stored_alignment, viewport
+from .. import comparison, stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..comparison import add, copies, end, is_shown
 from ..mesh_data import Refusal, Surface, read_surface, seen_positions
@@ -90,6 +90,7 @@ def show(context: bpy.types.Context, source: bpy.types.Object, target: bpy.types
     for obj, role, matrix in ((source, "source", source.matrix_world), (target, "target", moved)):
         name = rpt_("{} (side by side, mirrored)") if mirrored and obj == target else rpt_("{} (side by side)")
         add(context, obj, role, name.format(obj.name), matrix)
+    comparison.remember_selection(context)
     look(context)
     viewport.show_colors(context)
     if has_pictures(target):
@@ -147,12 +148,8 @@ class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove the copies and make the target active again."""
+        """Remove the copies; what was selected and shown before is so again."""
         leave(context)
-        target = context.scene.mobius.target
-        if target is not None and target.name in context.view_layer.objects:
-            target.select_set(True)
-            context.view_layer.objects.active = target
         return {"FINISHED"}
 
 

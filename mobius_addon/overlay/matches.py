@@ -71,8 +71,8 @@ def hues(places: Floats) -> Floats:
     Even steps keep many apart; every other one is lighter, so that neighbours are too.
     """
     off = places - places.mean(axis=0)
-    plane = np.linalg.svd(off, full_matrices=False)[2][:2]
-    order = np.argsort(np.arctan2(*(off @ plane.T).T), kind="stable")
+    flat = off @ np.linalg.eigh(off.T @ off)[1][:, 1:]  # along the two longest axes
+    order = np.argsort(np.arctan2(flat[:, 0], flat[:, 1]), kind="stable")
     hue = np.empty(len(places))
     hue[order] = np.arange(len(places)) / len(places)
     light = np.where(np.argsort(order) % 2 == 0, 0.0, 0.45)[:, None]

@@ -33,7 +33,7 @@ def draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, found: 
     column.label(text=iface_(text).format(found["coverage"]), icon=icon, translate=False)
     if (error := found.get("expected_error")) is not None:
         length = lengths(context, error * diagonal(context.scene.mobius.source))
-        text = iface_("Mean error about {} ({:.1%} of the size)").format(length, error)
+        text = iface_("Mean error about {} ({:.1%})").format(length, error)
         column.label(text=text, icon="BLANK1", translate=False)
     text = iface_("mirrored") if found["mobius"]["reflected"] else iface_("not mirrored")
     column.label(text=text, icon="BLANK1", translate=False)
@@ -48,5 +48,5 @@ def lengths(context: bpy.types.Context, length: float) -> str:
     """Return a length of the scene in its units."""
     units = context.scene.unit_settings
     if units.system == "NONE":
-        return f"{length:.3g}"
-    return bpy.utils.units.to_string(units.system, "LENGTH", length * units.scale_length, precision=3)
+        return f"{length:.2g}"
+    return bpy.utils.units.to_string(units.system, "LENGTH", length * units.scale_length, precision=2)

@@ -139,7 +139,7 @@ def test_the_result_begins_with_a_verdict_and_ends_with_a_proof(pair: tuple[Any,
     said = [text for text in drawn(panel.MOBIUS_PT_result) if text]
     size = np.linalg.norm(np.ptp(positions(pair[0]), axis=0))
     assert said[0] == f"Good: {found['coverage']:.0%} matched"
-    assert said[1].startswith(f"Mean error about {100 * size * found['expected_error']:.3g} cm (")
+    assert said[1].startswith(f"Mean error about {100 * size * found['expected_error']:.2g} cm (")
     assert said[2:] == ["not mirrored", "Side by Side"]
     parts = {"source_share": 0.9, "target_share": 0.75, "value": 7.0, "upper_bound": 7.5}
     pair[1].data.mobius_alignment.report = json.dumps(found | {"overlap": parts})
@@ -160,6 +160,7 @@ TIE = "ambiguous orientation: mirrored and not mirrored differ by 1.0 % of the s
 RIVAL = "ambiguous: a map that sends everything elsewhere scores within 3.0 % of the samples of the best"
 OPEN = "not proved optimal: a value up to 3.0 % larger was not excluded in the time given"
 DEEP = "'A' is deep, 30% of it has hardly any room in a disc: cut out what is to be matched"
+WAY = "only one orientation was searched: try mirrored too"
 MAYBE = "doubtful, perhaps because "
 DOUBT = "doubtful: more likely than not the map errs by more than 2 % of the source's diagonal"
 
@@ -172,7 +173,7 @@ DOUBT = "doubtful: more likely than not the map errs by more than 2 % of the sou
         (["in the overlap: " + RIVAL, TIE], "Check", ["Take the Rival", "Take Mirrored"]),
         ([OPEN], "Check", ["Search Without Time Limit"]),
         ([DOUBT], "Doubtful", ["landmarks"]),
-        ([DOUBT, MAYBE + "only one orientation was searched: try mirrored too"], "Doubtful", ["landmarks", "Search Both Ways"]),
+        ([DOUBT, MAYBE + WAY], "Doubtful", ["landmarks", "Search Both Ways"]),
         ([DOUBT, MAYBE + DEEP], "Doubtful", ["landmarks", "source_cut", "target_cut"]),
         (["'A': 2 openings (4, 5 edges) closed, for the computation only"], "Good", []),
         (["something new"], "Check", []),
@@ -249,11 +250,16 @@ def test_the_rival_can_be_taken(pair: tuple[Any, Any]) -> None:
 def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" in said
-    under_way = SimpleNamespace(title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7), waits=None)
+    under_way = SimpleNamespace(
+        title="Align", progress=Progress("Searching", 0.5, 30.0, 40.0, 7), waits=None, seconds_left=None
+    )
     monkeypatch.setattr(jobs.Job, "current", under_way)
     said = drawn(panel.MOBIUS_PT_main)
     assert "Align" not in said
-    assert {"Searching", "30.0 of at most 40.0, gap 10.0", "Stop"} <= set(said)
+    assert {"Searching", "30.0 of at most 40.0, gap 10.0", "Stop", "ESC stops"} <= set(said)
+    for seconds, text in ((7.6, "about 8 s left"), (0.2, "about 1 s left"), (200.0, "about 3 min left")):
+        under_way.seconds_left = seconds
+        assert text in drawn(panel.MOBIUS_PT_main)
     under_way.waits = "'Target' has to be in Object Mode"
     assert {"Waiting", "'Target' has to be in Object Mode", "Stop"} <= set(drawn(panel.MOBIUS_PT_main))
     for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer):
