@@ -17,6 +17,12 @@ def is_copy(obj: bpy.types.Object) -> bool:
     return _ROLE in obj
 
 
+def users_of(mesh: bpy.types.Mesh) -> int:
+    """Return how many use a mesh, beyond copies that are only looked at."""
+    collection = bpy.data.collections.get(COLLECTION)
+    return mesh.users - sum(obj.data == mesh for obj in (collection.objects if collection is not None else ()))
+
+
 def remember_selection(context: bpy.types.Context) -> None:
     """Keep which objects are selected and active, by name, in the collection of the comparison."""
     collection = context.scene.collection.children[COLLECTION]

@@ -27,6 +27,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..solver import Cancelled, MeshError, Progress
 from .mesh_data import Refusal
 from .registration import register_factory
+from .translation import told
 from .usable import by_uid, why_not_now
 
 Report = Callable[[Progress], bool | None]
@@ -262,7 +263,7 @@ class JobOperator:
         redraw(context)
 
     def _refused(self, error: Exception) -> set[str]:
-        self.report({"ERROR"}, str(error))
+        self.report({"ERROR"}, told(str(error)))
         return {"CANCELLED"}
 
     def _stopped(self) -> set[str]:

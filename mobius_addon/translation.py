@@ -19,14 +19,16 @@ _CONTEXTS = ("*", "Operator")
 def told(sentence: str) -> str:
     """Return a sentence of the solver, which knows no Blender, in the interface's language; as it is if nobody has it.
 
-    The solver fills in names and figures itself: the sentence is recognised by the template it was made from.
+    The solver fills in names and figures itself: the sentence is recognised by the template it was made from. What is
+    filled in can be a sentence too, or several with commas between.
     """
     for template, pattern in _patterns():
         if found := pattern.fullmatch(sentence):
             names = (sentence[:start].endswith("'") for start, _ in found.regs[1:])
             parts = zip(found.groups(), names, strict=True)
             return rpt_(template).format(*(part if is_name else told(part) for part, is_name in parts))
-    return sentence
+    listed = sentence.split(", ")
+    return ", ".join(map(told, listed)) if len(listed) > 1 else sentence
 
 
 @lru_cache(maxsize=1)

@@ -21,6 +21,7 @@ from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
+from ..translation import told
 from ..usable import by_uid, why_not_pair
 from . import side_by_side
 
@@ -114,7 +115,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         """Report an alignment."""
         for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
-                self.report({"WARNING"}, warning)
+                self.report({"WARNING"}, told(warning))
         self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))
 
 

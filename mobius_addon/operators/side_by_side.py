@@ -15,6 +15,7 @@ from ..mesh_data import Refusal, Surface, read_surface, seen_positions
 from ..preferences import preferences
 from ..results import pattern_color, read_layout, require_room, write_color
 from ..textures.writing import has_pictures
+from ..translation import told
 from ..usable import why_not_aligned
 
 GAP = 0.15
@@ -41,7 +42,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
         try:
             show(context, context.scene.mobius.source, context.scene.mobius.target)
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -289,6 +289,9 @@ def test_what_was_selected_before_is_so_again_and_nobody_works_on_copies(aligned
     left, right = bpy.context.selected_objects
     assert {left.data, right.data} == {source.data, target.data}
     assert not bpy.ops.mobius.use_selected.poll()
+    bpy.ops.mobius.transfer(kinds={"UV"})  # the copies show it too, and are nobody's other objects
+    assert target.data.mobius_transferred
+    assert "shares its mesh" not in target.data.mobius_transferred
     settings = bpy.context.scene.mobius
     settings.source = left
     with pytest.raises(RuntimeError, match="is a copy of Side by Side: choose the object that it shows"):

@@ -41,11 +41,11 @@ def of_code() -> set[str]:
             for call in _calls(path):
                 name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
                 if name in TRANSLATED:
-                    found |= set(_constants(call.args[0]))
+                    found |= set(constants(call.args[0]))
                 elif name in ("label", "prop", "operator", "column") and "layout" not in path.stem:
                     for keyword in call.keywords:
                         if keyword.arg in ("text", "heading"):
-                            found |= set(_constants(keyword.value))
+                            found |= set(constants(keyword.value))
     return {text for text in found if text.strip()}
 
 
@@ -53,13 +53,41 @@ def _calls(path: Path) -> Iterator[ast.Call]:
     return (x for x in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(x, ast.Call))
 
 
-def _constants(node: ast.AST) -> Iterator[str]:
+def constants(node: ast.AST) -> Iterator[str]:
     """Texts that an argument can be: itself, or either branch of a condition."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.IfExp):
-        yield from _constants(node.body)
-        yield from _constants(node.orelse)
+        yield from constants(node.body)
+        yield from constants(node.orelse)
     elif isinstance(node, ast.BoolOp):
         for value in node.values:
-            yield from _constants(value)
+            yield from constants(value)
+
+
+def of_sentences() -> set[str]:
+    """Templates of what the solver refuses and what the add-on refuses or reports without Blender's own translation.
+
+    What is filled in is {}. Errors of the command line, of files and of damaged data are for those who read English.
+    """
+    found: set[str] = set()
+    for folder, errors in (("solver", ("MeshError",)), ("mobius_addon", ("Refusal",))):
+        for path in sorted((ROOT / folder).glob("**/*.py")):
+            if set(path.parts) & {"demo", "command_line", "files", "collection"} or path.name.startswith("german"):
+                continue
+            for call in _calls(path):
+                name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
+                said = call.args[:1] if name in errors else call.args[1:2] if name in ("report", "_report") else []
+                found |= {text for argument in said for text in _templates(argument)}
+    return {text for text in found if text.count(" ") > 2}
+
+
+def _templates(node: ast.AST) -> Iterator[str]:
+    """Texts that an expression can be, with {} for what is filled in; nothing of what calls another function."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    elif isinstance(node, ast.IfExp):
+        yield from _templates(node.body)
+        yield from _templates(node.orelse)
