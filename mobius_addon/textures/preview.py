@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import bpy
 
-from ..attributes import Transfer, TransferSettings
 from ..mesh_data import Refusal
 from .writing import PROPERTY, made_or_removed, write_textures
+
+if TYPE_CHECKING:
+    from ..attributes import Transfer, TransferSettings
 
 SIZE = 1024
 """Side of the pictures of a preview at most, in texels: as many as half of a large window shows."""
