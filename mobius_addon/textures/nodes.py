@@ -10,13 +10,13 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...solver.carry.textures import CLIP, EXTEND, REPEAT
+from ...solver.carry.textures import CLIP, EXTEND, MIRROR, REPEAT
 from ...solver.surface.mesh import Floats
 
 _SHADERS = ("BSDF_PRINCIPLED", "EMISSION", "BSDF_DIFFUSE", "BACKGROUND", "BSDF_TOON", "BSDF_GLOSSY")
 """Shaders that say what color a surface has, the most telling first."""
 
-_WRAPS = {"REPEAT": REPEAT, "EXTEND": EXTEND, "CLIP": CLIP, "MIRROR": REPEAT}
+_WRAPS = {"REPEAT": REPEAT, "EXTEND": EXTEND, "CLIP": CLIP, "MIRROR": MIRROR}
 
 
 @dataclass(frozen=True)

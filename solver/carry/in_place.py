@@ -60,9 +60,10 @@ def _spread(faces: Integers, barycentric: Floats, left: Booleans, source: Triang
     """Settle vertices that are left, (n,), from those beside them, in place, as long as there are any on the source."""
     beyond, normals = faces_beyond(source), (source.vertex_normals(), target.vertex_normals())
     new = ~left & (faces >= 0)
+    edges = np.concatenate([target.edges, target.edges[:, ::-1]])
+    edges = edges[left[edges[:, 1]]]
     while left.any() and new.any():
-        pairs = np.concatenate([target.edges, target.edges[:, ::-1]])
-        pairs = pairs[new[pairs[:, 0]] & left[pairs[:, 1]]]
+        pairs = edges[new[edges[:, 0]] & left[edges[:, 1]]]
         vertex, first = np.unique(pairs[:, 1], return_index=True)
         start = faces[pairs[first, 0]]
         face, place, off = nearest_from(source, beyond, start[:, None], target.vertices[vertex])

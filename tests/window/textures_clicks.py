@@ -32,8 +32,8 @@ def steps() -> Wait:
     before = state(names)
 
     assert bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True) == {"FINISHED"}
-    # the engine that draws materials compiles its shaders first
-    yield from picture("textures-preview", 30.0)
+    yield from compiled()
+    yield from picture("textures-preview")
     assert state(names)["target"] == before["target"], "a preview has changed the target"
     assert bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True) == {"FINISHED"}
     yield 0.5
@@ -59,7 +59,8 @@ def steps() -> Wait:
     yield from click_on(transfer)
     yield from until(lambda: Job.current is None and state(names) != before)
     bpy.context.space_data.shading.type = "MATERIAL"
-    yield from picture("textures-transferred", 30.0)
+    yield from compiled()
+    yield from picture("textures-transferred")
     after = state(names)
     assert after["images"] == before["images"] + 1
     made = bpy.data.objects[names[1]].material_slots[0].material
@@ -72,6 +73,13 @@ def steps() -> Wait:
     yield 1.0
     assert state(names) == after, "redo brings them back"
     print("[clicks] done", flush=True)
+
+
+def compiled() -> Wait:
+    """Wait for the engine that draws materials: it compiles its shaders first, and shows them when drawn again."""
+    for _ in range(30):
+        region("WINDOW").tag_redraw()
+        yield 1.0
 
 
 def set_the_scene() -> tuple[str, str]:

@@ -12,8 +12,8 @@ import numpy.typing as npt
 Pixels = npt.NDArray[Any]
 """(height, width, channels) uint8 or float32; the first row is the lowest, where v is 0."""
 
-REPEAT, EXTEND, CLIP = 0, 1, 2
-"""What lies beyond the edge of a picture: the picture again, its last texels, or nothing."""
+REPEAT, EXTEND, CLIP, MIRROR = 0, 1, 2, 3
+"""What lies beyond the edge of a picture: the picture again, its last texels, nothing, or the picture mirrored."""
 
 _FINE = 1 << 16
 """Steps in which linear values are looked up: the steepest part of sRGB rises by 1/20 of a byte in one."""
@@ -30,7 +30,7 @@ class Picture:
     table : (channels, 256) float32 or None
         What each byte of each channel stands for; None for floats.
     wrap : int
-        `REPEAT`, `EXTEND` or `CLIP`.
+        `REPEAT`, `EXTEND`, `CLIP` or `MIRROR`.
     label : (height, width) uint16 or None
         The island of a layout that each texel belongs to, 0 for none; None: all may be read from everywhere.
     opaque : (height, width) uint8 or None

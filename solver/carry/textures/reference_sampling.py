@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...surface.mesh import Booleans, Floats, Integers
-from .picture import Picture
+from .picture import EXTEND, MIRROR, REPEAT, Picture
 from .raster import touched
 
 TRACE = 0.25
@@ -102,10 +102,11 @@ def _bilinear(picture: Picture, at: Floats, own: npt.NDArray[np.uint16]) -> tupl
 
 def wrapped(index: Integers, size: int, wrap: int) -> tuple[Integers, Booleans]:
     """Return which rows, or columns, of a picture those beyond its edge are, and whether they are any."""
-    if wrap == 0:
-        return index % size, np.ones(len(index), bool)
+    if wrap in (REPEAT, MIRROR):
+        there = index % (size if wrap == REPEAT else 2 * size)
+        return np.minimum(there, 2 * size - 1 - there), np.ones(len(index), bool)
     within = (index >= 0) & (index < size)
-    return np.clip(index, 0, size - 1), within | (wrap == 1)
+    return np.clip(index, 0, size - 1), within | (wrap == EXTEND)
 
 
 def islands(

@@ -45,7 +45,7 @@ typedef struct {
     const float *table;     /* what each byte of each channel stands for, (channels, 256) */
     const uint8_t *opaque;  /* (height, width), how much each texel counts; NULL: all the same */
     const uint16_t *label;  /* (height, width), 0: no island; NULL: any texel may be read */
-    int64_t wrap;           /* beyond the edge: 0 again from the other side, 1 the edge, 2 nothing */
+    int64_t wrap;           /* beyond the edge: 0 again from the other side, 1 the edge, 2 nothing, 3 again mirrored */
 } Picture;
 
 EXPORT int64_t mobius_texels_interface(void) { return INTERFACE; }
@@ -326,8 +326,10 @@ static inline int64_t wrapped(int64_t i, int64_t size, int64_t wrap) {
     if (i >= 0 && i < size) return i;
     if (wrap == 2) return -1;
     if (wrap == 1) return i < 0 ? 0 : size - 1;
-    i %= size;
-    return i < 0 ? i + size : i;
+    int64_t period = wrap == 3 ? 2 * size : size;
+    i %= period;
+    if (i < 0) i += period;
+    return i < size ? i : period - 1 - i;
 }
 
 /* What a value between two bytes stands for. */

@@ -1,5 +1,7 @@
 """Pictures carried between surfaces that are known: what arrives in each texel is computed by other means."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from correspondences import planar_correspondence, sheet
@@ -10,6 +12,10 @@ from scipy import ndimage
 from solver import Correspondence, TriangleMesh
 from solver.carry.interpolate import places
 from solver.carry.textures import (
+    CLIP,
+    EXTEND,
+    MIRROR,
+    REPEAT,
     Carrying,
     FromCorners,
     FromPictures,
@@ -57,7 +63,7 @@ def psnr(error: np.ndarray) -> float:
     return float(-10 * np.log10((error**2).mean()))
 
 
-def pictures(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, **options: bool) -> FromPictures:
+def pictures(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, **options: Any) -> FromPictures:
     island = island_numbers(mesh.faces, uv)
     return FromPictures.of(
         [Picture.of(pixels, **options)], [uv], np.zeros(len(uv), int), [island], pixels.shape[2]
@@ -150,6 +156,23 @@ def test_no_texel_of_another_island_is_read() -> None:
             assert ((red == 1) ^ (green == 1)).all()
 
 
+def test_what_lies_beyond_the_edge() -> None:
+    """A layout twice as wide as the picture: again, mirrored, its edge, or nothing."""
+    source = sheet(9)[0]
+    own, wide = flat_uv(source), flat_uv(source)
+    wide[:, :, 0] = 2 * wide[:, :, 0]
+    pixels = smooth_picture(64, channels=1)
+    carrying = Carrying(planar_correspondence(source, source), source, source)
+    beyond = {
+        REPEAT: pixels, MIRROR: pixels[:, ::-1], EXTEND: np.repeat(pixels[:, -1:], 64, axis=1), CLIP: 0 * pixels
+    }  # fmt: skip
+    for wrap, expected in beyond.items():
+        paint = pictures(pixels, wide, source, wrap=wrap)
+        found = resample(InLayout.of(carrying, own, (64, 128)), (64, 128), [Wanted(paint, np.asarray)]).pixels[0]
+        assert np.abs(found[:, :63] - pixels[:, :63]).max() < 1e-5
+        assert np.abs(found[:, 65:] - expected[:, 1:]).max() < 1e-5, wrap
+
+
 def test_islands_on_top_of_each_other_read_the_same_texels() -> None:
     source = sheet(9)[0]
     uv = flat_uv(source)
@@ -215,7 +238,7 @@ def test_a_surface_that_its_file_cut_open_is_walked_over_as_one() -> None:
     assert np.abs(picture.pixels[0][:, :, 0] - u).max() < 1e-6
 
 
-@given(st.integers(0, 10**6), st.sampled_from([0, 1, 2]), st.booleans())
+@given(st.integers(0, 10**6), st.sampled_from([0, 1, 2, 3]), st.booleans())
 @settings(max_examples=15, deadline=None)
 def test_c_and_numpy_do_the_same(seed: int, wrap: int, mirrored: bool) -> None:
     if compiled.library() is None:
