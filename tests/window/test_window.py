@@ -21,7 +21,7 @@ ROOTS = Path(os.environ.get("BLENDER_ROOTS", "/opt"))
 PICTURES = (
     *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
     *("heat-map-factor", "side-by-side", "discs", "german"),
-    *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "cleared"),
+    *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "shown", "cleared"),
 )
 
 
