@@ -15,6 +15,7 @@ from typing import Any
 import hand
 import meanwhile
 import redoing
+import showing
 from hand import Wait, choose, click_on, escape, find, picture, redo, undo, until
 from mathutils import Euler, Vector
 
@@ -26,9 +27,10 @@ Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
 def steps() -> Wait:
     """Everything, with the seconds to wait in between."""
     source, target = set_the_scene()
+    # what is shown after Align has its own steps
+    bpy.context.preferences.addons[PACKAGE].preferences.after_align = "nothing"
     yield 1.0
     before = state(source), state(target)
-    look = looks()
 
     yield from choose("source", source)
     yield from choose("target", target)
@@ -61,9 +63,6 @@ def steps() -> Wait:
     assert "Mobius" in source.data.uv_layers
     assert "Mobius" in target.data.uv_layers
     aligned = state(source), state(target)
-    view = bpy.context.window_manager.mobius_view
-    assert bpy.context.space_data.local_view is not None, "the result is not shown"
-    assert view.matches
     yield from picture("aligned")
 
     transfer = yield from find("bpy.ops.mobius.transfer", upwards=True)
@@ -78,22 +77,18 @@ def steps() -> Wait:
         yield 1.0
         # undo has made the objects anew
         assert tuple(state(bpy.data.objects[name]) for name in names) == expected, "one undo takes back one step"
-    yield from until(lambda: looks() == look)  # where the alignment is undone, the view is as before
     redo()
-    yield from until(lambda: bpy.context.space_data.local_view is not None)
+    yield 1.0
     redo()
     yield 1.0
     assert state(bpy.data.objects[names[1]])["keys"], "redo brings the transfer back"
 
-    # what follows is about other things, in the view as it was
-    bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
-    preferences = bpy.context.preferences.addons[PACKAGE].preferences
-    preferences.after_align = "nothing"
-    yield 1.0
-    assert looks() == look
     yield from redoing.steps(PACKAGE, names)
     yield from meanwhile.steps(PACKAGE, names)
+    yield from showing.steps(PACKAGE, names)
 
+    view = bpy.context.window_manager.mobius_view
+    look = bpy.context.space_data.shading.type, bpy.context.space_data.shading.color_type
     view.matches = True
     yield from picture("matches")
     view.matches = False
@@ -106,11 +101,6 @@ def steps() -> Wait:
     bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
     yield 0.5
     assert bpy.context.space_data.local_view is None
-    assert looks()[:2] == look[:2]
-    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
-    yield 0.5
-    bpy.data.objects.remove(bpy.context.view_layer.objects.active)  # one of the copies
-    yield from until(lambda: looks()[:3] == look[:3])
     view.matches, view.lines = True, 0.3
     bpy.ops.mobius.show_discs()
     yield from picture("discs")
@@ -119,11 +109,13 @@ def steps() -> Wait:
     bpy.context.preferences.view.language = "en_US"
     yield 0.5
 
+    shading = bpy.context.space_data.shading
     bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
     yield 0.5
     bpy.ops.mobius.clear("EXEC_DEFAULT", True)
     yield from picture("cleared")
-    assert looks()[:3] == look[:3], "the viewport looks otherwise than before"
+    assert bpy.context.space_data.local_view is None
+    assert (shading.type, shading.color_type) == look, "the viewport looks otherwise than before"
     assert [view.matches, view.discs, view.legend] == [False] * 3
     for name in names:
         found = state(bpy.data.objects[name])
@@ -155,14 +147,6 @@ def set_the_scene() -> tuple[Any, Any]:
     bpy.ops.view3d.view_all()
     bpy.ops.ed.undo_push(message="scene")
     return source, target
-
-
-def looks() -> tuple[Any, ...]:
-    """How the viewport shows things, and from where."""
-    space = bpy.context.space_data
-    view, shading = space.region_3d, space.shading
-    place = [round(x, 3) for x in (*view.view_location, *view.view_rotation, view.view_distance)]
-    return shading.type, shading.color_type, space.local_view is not None, place
 
 
 def state(obj: Any) -> dict[str, Any]:
