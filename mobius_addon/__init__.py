@@ -19,6 +19,7 @@ _TOOLS = (
     "deleted",
     "jobs",
     "operators",
+    "shown_result",
     "preset_menus",
     "panel",
     "translation",

@@ -15,6 +15,7 @@ alone.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -26,6 +27,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..solver import Cancelled, MeshError, Progress
 from .mesh_data import Refusal
 from .registration import register_factory
+from .translation import told
 from .usable import by_uid, why_not_now
 
 Report = Callable[[Progress], bool | None]
@@ -33,6 +35,10 @@ Work = Callable[[Report], Any]
 
 INTERVAL = 0.1
 """Seconds between looks at the worker."""
+
+
+SOON, EARLY = 1.0, 0.1
+"""Seconds, and the share of the work, before which nobody can say how long it will take."""
 
 
 class Job:
@@ -60,6 +66,7 @@ class Job:
 
     def __init__(self, work: Work, title: str = "") -> None:
         self.title = title
+        self.begun = time.monotonic()
         self.progress = Progress(n_("Starting"), 0.0)
         self.waits: str | None = None
         self.told: int | None = None
@@ -87,6 +94,12 @@ class Job:
         self._stop.set()
 
     @property
+    def seconds_left(self) -> float | None:
+        """About how many seconds are left, if all goes on as it went; None where that cannot be said yet."""
+        spent, share = time.monotonic() - self.begun, self.progress.fraction
+        return spent * (1 - share) / share if spent > SOON and share > EARLY else None
+
+    @property
     def cancelled(self) -> bool:
         """Whether the work was asked to stop."""
         return self._stop.is_set()
@@ -103,6 +116,16 @@ def describe_proof(progress: Progress) -> str:
         return ""
     gap = progress.upper_bound - progress.value
     return iface_("{:.1f} of at most {:.1f}, gap {:.1f}").format(progress.value, progress.upper_bound, gap)
+
+
+def describe_left(job: Job) -> str:
+    """Return how long the work will take yet, or nothing where that cannot be said."""
+    left = job.seconds_left
+    if left is None or job.waits:
+        return ""
+    if left < 60:
+        return iface_("about {} s left").format(max(round(left), 1))
+    return iface_("about {} min left").format(round(left / 60))
 
 
 def why_busy() -> str | None:
@@ -132,6 +155,11 @@ class JobOperator:
     def finish(self, context: bpy.types.Context, result: Any) -> None:
         """Write the result and report it. May raise `Refusal`, before it writes."""
         raise NotImplementedError
+
+    @property
+    def is_persons(self) -> bool:
+        """Whether a person called it in a window and looks on, not a script or the redo panel."""
+        return not bpy.app.background and self.options.is_invoke and not self.options.is_repeat
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Do the work: at once for a script and for the redo panel, in the background for a person."""
@@ -217,13 +245,14 @@ class JobOperator:
         """Say in the status bar and the panel where the work is, if that is news."""
         stage = iface_("Waiting") if self._job.waits else iface_(progress.stage)
         now = ": ".join(filter(None, (iface_(self.job_title), stage, self._job.waits or describe_proof(progress))))
-        shown = now, round(100 * progress.fraction)
+        left = describe_left(self._job)
+        shown = f"{now}, {left}" if left else now, round(100 * progress.fraction)
         workspace = context.workspace
         if shown != self._shown or workspace.session_uid != self._job.told:
             if workspace.session_uid != self._job.told:  # the text belongs to a workspace, and another is shown now
                 clear_status(self._job)
             self._shown, self._job.told = shown, workspace.session_uid
-            workspace.status_text_set(f"{now}   |   {iface_('ESC: Stop')}")
+            workspace.status_text_set(f"{shown[0]}   |   {iface_('ESC: Stop')}")
             redraw(context)
 
     def _close(self, context: bpy.types.Context) -> None:
@@ -234,7 +263,7 @@ class JobOperator:
         redraw(context)
 
     def _refused(self, error: Exception) -> set[str]:
-        self.report({"ERROR"}, str(error))
+        self.report({"ERROR"}, told(str(error)))
         return {"CANCELLED"}
 
     def _stopped(self) -> set[str]:

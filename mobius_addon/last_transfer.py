@@ -12,6 +12,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from .attributes import KINDS, Transfer
+from .translation import told
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def announce(report: Callable[[set[str], str], None], target: bpy.types.Object, 
     The status bar shows the last report alone, which therefore says that there are others.
     """
     for warning in plan.warnings:
-        report({"WARNING"}, warning)
+        report({"WARNING"}, told(warning))
     text = rpt_("'{}' has {} from '{}'{}")
     said = text.format(target.name, describe_counts(plan.counts()), source, plan.unmatched.remark())
     if plan.warnings:

@@ -27,12 +27,24 @@ class MOBIUS_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
+    after_align: bpy.props.EnumProperty(
+        name="After Align",
+        description="What the viewport shows when an alignment is done; End Side by Side and undo take it away again",
+        items=(
+            ("side_by_side", "Side by Side", "Copies of both meshes in one pose, with one pattern and matched points"),
+            ("pattern", "Pattern", "Both meshes where they are, with one pattern"),
+            ("nothing", "Nothing", "What it showed before"),
+        ),
+        default="side_by_side",
+    )
+
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the settings."""
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "time_limit")
         layout.prop(self, "check_while_drawing")
+        layout.prop(self, "after_align")
 
 
 def preferences(context: bpy.types.Context) -> MOBIUS_AP_preferences | None:

@@ -8,13 +8,15 @@ draws.
 import bpy
 
 from . import overlay
+from .comparison import is_copy
 from .live import samplable
 from .options import AlignOptions, ScanOptions, TransferOptions
+from .proof import MobiusProof
 from .usable import is_in_scene
 
 
 def _is_choosable(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH" and is_in_scene(obj, settings.id_data)
+    return obj.type == "MESH" and not is_copy(obj) and is_in_scene(obj, settings.id_data)
 
 
 def _names_to_sample(settings: bpy.types.PropertyGroup, _context: bpy.types.Context, _typed: str) -> list[str]:
@@ -36,6 +38,9 @@ class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.Prope
         description="Mesh to carry data to",
         type=bpy.types.Object,
         poll=_is_choosable,
+    )
+    proof: bpy.props.PointerProperty(
+        name="Proof", description="What is proved about the alignment of the chosen pair", type=MobiusProof
     )
     live_attribute: bpy.props.StringProperty(
         name="Attribute",
@@ -76,14 +81,14 @@ class MobiusView(bpy.types.PropertyGroup):
 
     matches: bpy.props.BoolProperty(
         name="Matched Points",
-        description="Draw matched points of source and target and lines between them, colored by confidence",
+        description="Draw matched points of source and target and lines between them, each in a color of its own",
         default=False,
         update=_show_or_hide,
     )
     count: bpy.props.IntProperty(
         name="Points",
         description="How many matched points are drawn, spread evenly over the target",
-        default=200,
+        default=20,
         min=1,
         soft_max=2000,
         max=20000,
@@ -114,7 +119,7 @@ class MobiusView(bpy.types.PropertyGroup):
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(
-    (MobiusSettings, MobiusAlignment, MobiusView)
+    (MobiusProof, MobiusSettings, MobiusAlignment, MobiusView)
 )
 
 

@@ -14,8 +14,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Alignment, Correspondence, report
 from . import earlier_version
-from .fingerprints import fingerprint_of
+from .fingerprints import fingerprint_of, is_other
 from .mesh_data import Refusal, Surface
+from .topology_cache import MAX_POLYGONS
 
 
 def store(
@@ -103,6 +104,24 @@ def _parsed(report: str) -> dict[str, Any] | None:
         return None
 
 
+def why_stale(target: bpy.types.Object, source: bpy.types.Object) -> str | None:
+    """Return why the alignment that the target's mesh keeps with this source is of no use any more, or None if it is.
+
+    Cheap enough to be asked at every redraw; in other modes than Object Mode nothing is known.
+    """
+    kept = target.data.mobius_alignment
+    for obj, fingerprint in ((source, kept.source_fingerprint), (target, kept.target_fingerprint)):
+        small = obj.mode == "OBJECT" and len(obj.data.polygons) <= MAX_POLYGONS
+        if small and is_other(obj, fingerprint):
+            return edited(obj.name)
+    return None
+
+
+def edited(name: str) -> str:
+    """Return the sentence for a mesh that is not what was aligned any more."""
+    return rpt_("'{}' has been edited since it was aligned: press Align again").format(name)
+
+
 def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Surface, Surface]) -> Correspondence:
     """Return the correspondence that the target's mesh keeps; `surfaces` are source and target as they are now.
 
@@ -119,7 +138,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
         (target, target_surface, kept.target_fingerprint),
     ):
         if surface.rest.fingerprint != fingerprint and earlier_version.fingerprint(surface.rest) != fingerprint:
-            raise Refusal(rpt_("'{}' has been edited since it was aligned: press Align again").format(obj.name))
+            raise Refusal(edited(obj.name))
     arrays = _unpack(kept.packed, target.name)
     return Correspondence(
         face=arrays["face"].astype(np.intp),

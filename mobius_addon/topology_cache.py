@@ -39,11 +39,14 @@ class Line:
         Whether it can be used, openings that will be filled included; None if that is not known yet.
     selectable : bool
         Whether there is something to select: what is in the way, or the loops that will be filled.
+    remedy : str
+        The setting that helps when it is turned on; empty if none does.
     """
 
     rows: tuple[str, ...]
     is_disc: bool | None
     selectable: bool = False
+    remedy: str = ""
 
 
 # a cache, never the truth: it can be emptied at any time
@@ -80,7 +83,7 @@ def _line(surface: Surface, repair: Repair) -> Line:
         refused = None
     found = topology(mesh)
     if problem := _problem(found, repair):
-        return Line(problem, False, True)
+        return Line(problem[:2], False, True, problem[2])
     if refused:  # such as a band with one side only
         return Line(refused, False)
     mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
@@ -104,18 +107,19 @@ def _held(tidy: Cleaned, repair: Repair) -> tuple[str, ...]:
     return () if found is None else (iface_(_HELD[found.kind]),)
 
 
-def _problem(found: Topology, repair: Repair) -> tuple[str, str] | None:
-    """Return the first thing that is in the way, and what to do about it."""
+def _problem(found: Topology, repair: Repair) -> tuple[str, str, str] | None:
+    """Return the first thing that is in the way, what to do about it, and the setting that does it, if one does."""
     loops = found.boundary_loops
-    for count, what, remedy in (
-        (len(found.non_manifold_edges), n_("{:,} edges with over 2 faces:"), n_("delete the extra faces")),
-        (len(found.non_manifold_vertices), n_("{:,} points where parts touch:"), n_("split them")),
-        (found.parts if found.parts > 1 else 0, n_("{:,} separate parts:"), n_("keep one, or turn on Largest Part")),
-        (0 if repair.fill_holes else len(loops[1:]), n_("{:,} openings:"), n_("turn on Fill Holes")),
-        (found.handles, n_("{:,} handles, as of a cup:"), n_("cut through them and fill")),
+    parts = found.parts if found.parts > 1 else 0
+    for count, what, remedy, setting in (
+        (len(found.non_manifold_edges), n_("{:,} edges with over 2 faces:"), n_("delete the extra faces"), ""),
+        (len(found.non_manifold_vertices), n_("{:,} points where parts touch:"), n_("split them"), ""),
+        (parts, n_("{:,} separate parts:"), n_("keep one, or turn on Largest Part"), "largest_part"),
+        (0 if repair.fill_holes else len(loops[1:]), n_("{:,} openings:"), n_("turn on Fill Holes"), "fill_holes"),
+        (found.handles, n_("{:,} handles, as of a cup:"), n_("cut through them and fill"), ""),
     ):
         if count:
-            return iface_(what).format(count), iface_(remedy)
+            return iface_(what).format(count), iface_(remedy), setting
     return None
 
 

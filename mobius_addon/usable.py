@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import stored_alignment
+from . import comparison, stored_alignment
 
 MODES = ("OBJECT", "POSE")
 """Of a window, in which meshes are written: other modes keep undo steps of their own, which would lack ours."""
@@ -36,6 +36,8 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
     if obj.type != "MESH":
         text = rpt_("'{}' is no mesh: convert it (Object > Convert > Mesh) or choose another {}")
         return text.format(obj.name, called)
+    if comparison.is_copy(obj):
+        return rpt_("'{}' is a copy of Side by Side: choose the object that it shows").format(obj.name)
     if not is_in_scene(obj, scene):
         return rpt_("'{}' is not in this scene: choose another {}").format(obj.name, called)
     return _why_not_read(obj) or (why_not_written(obj) if writes else None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -12,6 +14,21 @@ from ..solver.surface.mesh import Floats
 
 # type and color of the shading that viewports had before they showed our colors; of the session
 _before: dict[int, tuple[str, str]] = {}
+
+
+@dataclass(frozen=True)
+class _View:
+    """From where a viewport looked and what it showed, before it looked at some objects alone."""
+
+    location: tuple[float, ...]
+    rotation: tuple[float, ...]
+    distance: float
+    perspective: str
+    shading: tuple[str, str]
+    overlay: tuple[bool, bool]
+
+
+_alone: dict[int, _View] = {}
 
 
 def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
@@ -56,20 +73,23 @@ def show_as_before(context: bpy.types.Context) -> None:
     """Undo `show_colors` in every viewport that still shows them, and take the overlay's pictures away."""
     for screen in bpy.data.screens:
         for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
-            before = _before.pop(space.as_pointer(), None)
-            if before and (space.shading.type, space.shading.color_type) in (
-                ("SOLID", "VERTEX"),
-                ("MATERIAL", "VERTEX"),
-            ):
-                space.shading.color_type = before[1]
-                space.shading.type = before[0]
+            if before := _before.pop(space.as_pointer(), None):
+                _shade(space, before)
     view = context.window_manager.mobius_view
     view.matches = view.discs = view.legend = False
 
 
-def forget_shading() -> None:
+def _shade(space: bpy.types.SpaceView3D, before: tuple[str, str]) -> None:
+    """Give a viewport that still shows our colors, or materials in their place, other shading."""
+    if (space.shading.type, space.shading.color_type) in (("SOLID", "VERTEX"), ("MATERIAL", "VERTEX")):
+        space.shading.color_type = before[1]
+        space.shading.type = before[0]
+
+
+def forget_views() -> None:
     """Forget what viewports showed before: they are gone."""
     _before.clear()
+    _alone.clear()
 
 
 def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:
@@ -91,6 +111,7 @@ def look_at_selected_alone(context: bpy.types.Context, places: Floats) -> None:
     if space is not None:
         if space.local_view:
             _toggle_local_view(context)
+        _alone.setdefault(space.as_pointer(), _view_of(context, space))
         _toggle_local_view(context)
         with _in_viewport(context):
             _fill(bpy.context, places)
@@ -116,11 +137,51 @@ def _fill(context: bpy.types.Context, places: Floats) -> None:
     view.view_distance = size * context.space_data.lens / 72 + (high[2] - low[2]) / 2
 
 
+def looks_at_some_alone() -> bool:
+    """Return whether a viewport was made to look at some objects alone, and was not told to look at all again."""
+    return bool(_alone)
+
+
 def look_at_all_again(context: bpy.types.Context) -> None:
-    """Leave the view of some objects alone, if the viewport is in it."""
-    space = space_of(context)
-    if space is not None and space.local_view:
+    """Leave the view of some objects alone in every viewport that was made to look so; show all as it was before."""
+    if not _alone and (space := space_of(context)) is not None and space.local_view:  # since a file was opened
         _toggle_local_view(context)
+    overlay = context.window_manager.mobius_view
+    for window, area, space in _viewports(context):
+        before = _alone.pop(space.as_pointer(), None)
+        if before is None:
+            continue
+        if space.local_view:
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(window=window, area=area, region=region):
+                bpy.ops.view3d.localview(frame_selected=False)
+        view = space.region_3d
+        view.view_perspective, view.view_rotation = before.perspective, before.rotation
+        view.view_location, view.view_distance = before.location, before.distance
+        _shade(space, before.shading)
+        if before.shading[1] != "VERTEX":
+            _before.pop(space.as_pointer(), None)
+        overlay.matches, overlay.legend = before.overlay
+
+
+def _viewports(context: bpy.types.Context) -> Iterator[tuple[Any, Any, Any]]:
+    """Yield window, area and space of all 3D viewports that are shown."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                yield window, area, area.spaces.active
+
+
+def _view_of(context: bpy.types.Context, space: bpy.types.SpaceView3D) -> _View:
+    view, overlay = space.region_3d, context.window_manager.mobius_view
+    return _View(
+        tuple(view.view_location),
+        tuple(view.view_rotation),
+        view.view_distance,
+        view.view_perspective,
+        (space.shading.type, space.shading.color_type),
+        (overlay.matches, overlay.legend),
+    )
 
 
 def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from ...solver.surface.mesh import Booleans
-from ..textures.reading import Textures
+from ..textures.made import Textures
 from ..textures.writing import made_or_removed, write_textures
 from .carrier import Values
 from .key_set import KeyPlan

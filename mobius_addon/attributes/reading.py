@@ -10,8 +10,10 @@ import numpy as np
 
 from ...solver import Cancelled, Progress
 from ...solver.surface.mesh import Floats
+from ..comparison import users_of
 from ..mesh_data import Refusal
-from ..textures.reading import TextureReading, read_textures
+from ..textures.carrying import TextureReading
+from ..textures.reading import read_textures
 from .access import MAX_UV_MAPS, Layer
 from .carrier import Carrier, Values
 from .chosen import chosen_layers
@@ -267,7 +269,7 @@ def read_transfer(
         )
     if not pending and textures is None:
         raise Refusal(_nothing(source.name, settings, warnings))
-    if target.data.users > 1:
+    if users_of(target.data) > 1:
         warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
     warnings += left_behind(source, target, [x.layer.name for x in pending if x.row.kind == "shape-keys"])
     fixed = None

@@ -17,6 +17,9 @@ from .pictures import inline, thumbnail, view
 MOST_PICTURES = 120
 """Specimens that are shown, at most: a page of some 5 MB."""
 
+MOST_ROWS = 200
+"""Maps not to be trusted that are listed, at most; pairs.csv has all."""
+
 LABELLED = 60
 """Rows of a matrix up to which they have names."""
 
@@ -55,7 +58,10 @@ def page(collection: Collection, shapes: Shapes) -> str:
 def _summary(collection: Collection) -> str:
     certified = sum(known.certified for known in collection.figures)
     mirrored = sum(known.reflected for known in collection.figures)
-    said = f"{plural(len(collection.edges), 'pair')} aligned, {certified:,} certified, {mirrored:,} mirrored. "
+    levels = [known.judgement.level for known in collection.figures]
+    said = f"{plural(len(collection.edges), 'pair')} aligned: {levels.count('good'):,} good, "
+    said += f"{levels.count('check'):,} to be checked, {levels.count('doubtful'):,} doubtful by themselves; "
+    said += f"{certified:,} certified, {mirrored:,} mirrored. "
     triangles = len(collection.cycles[0])
     if triangles:
         open_ = int((collection.cycles[1] > SUSPECT).sum())
@@ -253,8 +259,17 @@ def _shown(collection: Collection, shapes: Shapes, pictures: dict[str, str]) -> 
 
 def _problems(collection: Collection) -> str:
     rows = [f"<tr><td>{escape(name)}</td><td>{escape(why)}</td></tr>" for name, why in collection.failures.items()]
-    for (a, b), error, bad in zip(collection.edges, collection.errors, collection.suspects, strict=True):
-        if bad:
+    for (a, b), known, error, bad in zip(
+        collection.edges, collection.figures, collection.errors, collection.suspects, strict=True
+    ):
+        why = [f"suspect: off by {100 * error:.0f} %"] if bad else []
+        if known.judgement.level == "doubtful":
+            why += [f"doubtful: {one.text}" for one in known.judgement.concerns if one.kind != "doubtful"] or [
+                "doubtful"
+            ]
+        if why:
             pair = f"{collection.names[a]} to {collection.names[b]}"
-            rows.append(f'<tr><td class="bad">{escape(pair)}</td><td>suspect: off by {100 * error:.0f} %</td></tr>')
+            rows.append(f'<tr><td class="bad">{escape(pair)}</td><td>{escape("; ".join(why))}</td></tr>')
+    if len(rows) > MOST_ROWS:
+        rows[MOST_ROWS:] = [f"<tr><td>and {len(rows) - MOST_ROWS:,} more</td><td>see pairs.csv</td></tr>"]
     return f"<h2>Not done, and not to be trusted</h2><table>{''.join(rows)}</table>" if rows else ""

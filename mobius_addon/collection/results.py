@@ -70,7 +70,7 @@ def _write_distances(path: Path, collection: Collection) -> None:
 def _write_pairs(path: Path, collection: Collection) -> None:
     with _table(path) as rows:
         told = ["distance", "dense", "cycle_error", "suspect", "seconds", "warnings"]
-        proved = ["value", "upper_bound", "certified", "samples", "reflected", "mean_confidence"]
+        proved = ["verdict", "value", "upper_bound", "certified", "samples", "reflected", "mean_confidence", "coverage"]
         rows.writerow(["source", "target", *proved, *told])
         for (a, b), known, error, bad in zip(
             collection.edges, collection.figures, collection.errors, collection.suspects, strict=True
@@ -79,12 +79,14 @@ def _write_pairs(path: Path, collection: Collection) -> None:
                 [
                     collection.names[a],
                     collection.names[b],
+                    known.judgement.level,
                     f"{known.value:.6g}",
                     f"{known.upper_bound:.6g}",
                     int(known.certified),
                     known.samples,
                     int(known.reflected),
                     f"{known.mean_confidence:.4f}",
+                    f"{known.coverage:.4f}",
                     f"{known.distance:.6g}",
                     int(known.dense),
                     f"{error:.4f}" if np.isfinite(error) else "",

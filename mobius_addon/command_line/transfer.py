@@ -110,7 +110,7 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
     from ..files import Unreadable, outputs, write_mesh
     from ..files.pictures_beside import write_pictures
     from ..last_transfer import describe_counts
-    from ..textures.by_map import read_map, textures_by_map
+    from ..textures.by_map import read_map, read_turns, textures_by_map
     from ..textures.writing import made_or_removed, write_textures
 
     if choices.kinds != ("textures",) or options.map or options.report or options.use_map or options.texture_map:
@@ -118,7 +118,8 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
     with opened_pair(options, write=True) as (source, target, notes):
         surfaces = read_pair(options, source, target)
         tiles = read_map(options.use_texture_map)
-        found = textures_by_map(source.obj, target.obj, surfaces, tiles, choices.textures)
+        turns = read_turns(options.use_texture_map, tiles)
+        found = textures_by_map(source.obj, target.obj, surfaces, tiles, turns, choices.textures)
         with made_or_removed() as made, restored_on_failure(target.obj):
             write_textures(target.obj, found, made)
     with outputs() as written:
@@ -131,8 +132,11 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
 
 
 def _require_writable(options: argparse.Namespace) -> None:
+    from ..textures.images import turns_beside
+
     inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
-    others = [options.map, options.report, options.texture_map]
+    beside = turns_beside(options.texture_map) if options.texture_map else None
+    others = [options.map, options.report, options.texture_map, beside]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 
 

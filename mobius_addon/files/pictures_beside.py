@@ -9,8 +9,8 @@ import bpy
 
 from ...solver.carry.textures import exr_bytes
 from ..mesh_data import Refusal
-from ..textures.images import FIRST_TILE, tile_path
-from ..textures.reading import Textures
+from ..textures.images import FIRST_TILE, tile_path, turns_beside
+from ..textures.made import Textures
 from ..textures.writing import PROPERTY
 from .parts import numbered_stems
 from .publishing import Outputs, real_place
@@ -57,8 +57,14 @@ def _is_free(path: Path, content: bytes, taken: set[Path]) -> bool:
 
 
 def write_map(found: Textures | None, final: Path, written: Outputs) -> None:
-    """Write the transfer map of a transfer, one file, or one for each tile with its number in the name."""
-    tiles: dict[int, Any] = {} if found is None or found.transfer_map is None else found.transfer_map
-    for number, pixels in tiles.items():
-        name = final if list(tiles) == [FIRST_TILE] else final.with_name(f"{final.stem}.{number}{final.suffix}")
-        written.path(name).write_bytes(exr_bytes(pixels))
+    """Write the transfer map of a transfer, one file, or one for each tile with its number in the name.
+
+    And beside it, as `turns_beside` names it, how normals turn.
+    """
+    if found is None:
+        return
+    for path, kept in ((final, found.transfer_map), (turns_beside(final), found.turns)):
+        tiles: dict[int, Any] = kept or {}
+        for number, pixels in tiles.items():
+            name = path if list(tiles) == [FIRST_TILE] else path.with_name(f"{path.stem}.{number}{path.suffix}")
+            written.path(name).write_bytes(exr_bytes(pixels))

@@ -47,7 +47,7 @@ _register, _unregister = register_factory(
 @bpy.app.handlers.persistent
 def _forget(*_: object) -> None:
     align.forget_last()
-    viewport.forget_shading()
+    viewport.forget_views()
 
 
 def register() -> None:

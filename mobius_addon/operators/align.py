@@ -1,6 +1,7 @@
 """Find the certified correspondence between two meshes and show it on both."""
 
 # no postponed annotations here: Blender reads the properties from them
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +11,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.spatial import KDTree
 
 from ... import solver
+from ...solver.align.confidence import expected_error
+from ...solver.align.judgement import judge
 from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
@@ -18,7 +21,9 @@ from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
+from ..translation import told
 from ..usable import by_uid, why_not_pair
+from . import side_by_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +115,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         """Report an alignment."""
         for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
-                self.report({"WARNING"}, warning)
+                self.report({"WARNING"}, told(warning))
         self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))
 
 
@@ -154,6 +159,9 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
         pair = self.objects()
         self.keep(*pair, result)
         self.announce(*pair, result)
+        if self.is_persons:
+            with suppress(Refusal, solver.MeshError):  # as where there is no room for one more color attribute
+                side_by_side.show_after(context, *pair)
 
 
 def as_read(uid: int, name: str, surface: Surface) -> bpy.types.Object:
@@ -240,10 +248,19 @@ def summary(source: str, target: str, alignment: solver.Alignment, correspondenc
     if alignment.whole is not None:
         paired, bare, _ = alignment.whole.counts()
         parts = f"; {paired:,} of {paired + bare:,} parts have a counterpart"
+    level = judge(alignment).level.title()
     return (
-        f"'{source}' on '{target}'{mirrored}: {_proof(alignment)}{margin}{share}{parts}; "
-        f"{correspondence.matched.mean():.0%} of the vertices matched"
+        f"{level}: '{source}' on '{target}'{mirrored}: {_proof(alignment)}{margin}{share}{parts}; "
+        f"{correspondence.matched.mean():.0%} of the vertices matched{_error(correspondence)}"
     )
+
+
+def _error(correspondence: solver.Correspondence) -> str:
+    """Say how far off the matched points are to be expected."""
+    if not correspondence.matched.any():
+        return ""
+    error = float(expected_error(correspondence.confidence[correspondence.matched]).mean())
+    return f", a mean error of about {error:.1%} of the source's diagonal expected"
 
 
 def _proof(alignment: solver.Alignment) -> str:

@@ -11,11 +11,13 @@ from ... import solver
 from ...solver.surface.mesh import Booleans
 from .. import landmarks, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
+from ..comparison import is_copy
 from ..computation import aligned
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
+from ..translation import told
 from ..usable import why_not, why_not_mode, why_not_two
 from .align import Aligned, as_read, summary, write_alignment
 
@@ -35,7 +37,7 @@ class _Target:
 def selected_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Return the selected meshes but the source, in alphabetical order."""
     source = context.scene.mobius.source
-    chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source]
+    chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source and not is_copy(obj)]
     return sorted(chosen, key=lambda obj: obj.name)
 
 
@@ -106,13 +108,13 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
         written = 0
         for target, done in zip(self._targets, result, strict=True):
             if isinstance(done, str):
-                self.report({"WARNING"}, f"{target.name}: {done}")
+                self.report({"WARNING"}, f"{target.name}: {told(done)}")
                 continue
             try:
                 obj = as_read(target.uid, target.name, target.surface)
                 results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
             except Refusal as refusal:
-                self.report({"WARNING"}, str(refusal))
+                self.report({"WARNING"}, told(str(refusal)))
                 continue
             surfaces = self._surface, target.surface
             with restored_on_failure(source), restored_on_failure(obj):
@@ -123,7 +125,7 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
                 stored_alignment.store(obj, source, done.alignment, done.correspondence, surfaces)
             written += 1
             for warning in filter(None, (unseen_warning(obj), *done.alignment.warnings)):
-                self.report({"WARNING"}, f"{target.name}: {warning}")
+                self.report({"WARNING"}, f"{target.name}: {told(warning)}")
             self.report({"INFO"}, summary(source.name, obj.name, done.alignment, done.correspondence))
         if not written:
             raise Refusal(rpt_("None of the selected meshes could be aligned with '{}'").format(source.name))

@@ -15,6 +15,7 @@ from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
 from ..options import repair
+from ..translation import told
 from ..usable import why_not
 
 
@@ -58,7 +59,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
         try:
             surface = read_surface(obj)
         except MeshError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         mesh, asked = surface.mesh, repair(context.scene.mobius)
         topology_cache.store(obj, surface, asked)

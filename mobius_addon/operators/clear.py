@@ -4,11 +4,10 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from .. import viewport
+from .. import comparison, viewport
 from ..jobs import why_busy
 from ..results import clear_results
 from ..usable import why_not_mode, why_not_written
-from . import side_by_side
 
 
 class MOBIUS_OT_clear(bpy.types.Operator):
@@ -44,7 +43,7 @@ class MOBIUS_OT_clear(bpy.types.Operator):
             if reason := why_not_written(obj):
                 self.report({"WARNING"}, reason)
                 continue
-            ended |= side_by_side.end_for(obj.data)
+            ended |= comparison.end_for(obj.data)
             count = clear_results(obj)
             cleared, removed = cleared + bool(count), removed + count
         if not (removed or ended):

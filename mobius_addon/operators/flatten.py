@@ -11,6 +11,7 @@ from ..heat_maps import DISC_MEASURES, measure
 from ..mesh_data import Refusal, read_surface
 from ..options import ScanOptions, outer_vertex, repair
 from ..results import require_room, write_color, write_layout
+from ..translation import told
 from ..usable import why_not, why_not_mode
 
 
@@ -58,7 +59,7 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
             outer = outer_vertex(obj, surface, self)
             flat = flattened(surface.mesh, self.method, repair(self), outer=outer, keys=surface.keys)
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         flattening = flat.flattening
         write_layout(obj, DISC_LAYOUT, flat.tidy.at_corners(flattening.disc, np.nan), surface)

@@ -9,6 +9,7 @@ from .. import stored_alignment
 from ..heat_maps import MAP_MEASURES, measure
 from ..mesh_data import Refusal, read_surface
 from ..results import require_room, write_color
+from ..translation import told
 from ..usable import why_not_aligned
 from ..viewport import show_colors
 
@@ -44,7 +45,7 @@ class MOBIUS_OT_heat_map(bpy.types.Operator):
             found = stored_alignment.load(target, source, surfaces)
             require_room(target, [], [shown.attribute])
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         write_color(target, shown.attribute, *shown.color(found, *(surface.mesh for surface in surfaces)))
         show_colors(context)

@@ -9,6 +9,7 @@ from .. import live, stored_alignment
 from ..attributes import restored_on_failure
 from ..jobs import why_busy
 from ..mesh_data import Refusal, read_surface
+from ..translation import told
 from ..usable import why_not_aligned
 
 
@@ -45,7 +46,7 @@ class MOBIUS_OT_live(bpy.types.Operator):
                 live.write_map(target, surfaces[0], found)
                 live.add_modifier(target, source, self.attribute)
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         self.report({"INFO"}, rpt_("'{}' follows '{}' of '{}'").format(target.name, self.attribute, source.name))
         return {"FINISHED"}

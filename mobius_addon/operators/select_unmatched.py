@@ -10,6 +10,7 @@ from .. import stored_alignment, viewport
 from ..attributes import mask_weights, unmatched_vertices
 from ..mesh_data import Refusal, foreach, read_surface
 from ..options import SourceMaskOptions, source_mask
+from ..translation import told
 from ..usable import why_not_aligned
 from .check import select_vertices, tell_unseen
 
@@ -47,7 +48,7 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
             found = stored_alignment.load(target, source, surfaces)
             unmatched = unmatched_vertices(found, surfaces[1], mask_weights(source, source_mask(self)))
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         chosen = unmatched
         if self.extend:

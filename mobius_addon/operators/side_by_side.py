@@ -11,14 +11,18 @@ from mathutils import Matrix
 from ...solver import Correspondence, MeshError
 from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Complexes, Floats
-from .. import stored_alignment, viewport
+from .. import comparison, stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
+from ..comparison import add, copies, end, is_shown
 from ..mesh_data import Refusal, Surface, read_surface, seen_positions
+from ..options import transfer_settings
+from ..preferences import preferences
 from ..results import pattern_color, read_layout, require_room, write_color
+from ..textures.preview import preview_settings, show_preview
 from ..textures.writing import has_pictures
+from ..translation import told
 from ..usable import why_not_aligned
-
-COLLECTION = "Mobius Side by Side"
+from .transfer import read_through
 
 GAP = 0.15
 """Between the two, as a share of the wider one's width."""
@@ -43,38 +47,116 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
         """Paint both meshes and put copies beside each other."""
         source, target = context.scene.mobius.source, context.scene.mobius.target
         try:
-            surfaces = read_surface(source), read_surface(target)
-            found = stored_alignment.load(target, source, surfaces)
-            hues = _hues(source, target, surfaces, found)
-            for obj in (source, target):
-                require_room(obj, [], [PATTERN_COLOR])
+            surfaces, found = show(context, source, target)
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
-        on_source = surfaces[0].mesh.vertices / np.linalg.norm(np.ptp(surfaces[0].mesh.vertices, axis=0))
-        for obj, hue, there in zip((source, target), hues, (on_source, found.matrix() @ on_source), strict=True):
-            known = np.isfinite(hue)
-            write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, hue, 0), there), known)
-        places = [_world(obj) for obj in (source, target)]
-        some = found.matched if found.matched.any() else found.face >= 0
-        pose = similarity(places[1][some], (found.matrix() @ places[0])[some])
-        right = viewport.axes_of(viewport.space_of(context))[0]
-        posed = places[1] @ pose[:3, :3].T + pose[:3, 3]
-        step = _beside(places[0] @ right, posed @ right)
-        end(context)
-        copies = [
-            _copy(context, source, source.matrix_world),
-            _copy(context, target, Matrix.Translation(right * step) @ Matrix(pose.tolist()) @ target.matrix_world),
-        ]
-        context.view_layer.update()  # what is new can be selected from then on
-        for obj in context.view_layer.objects:
-            obj.select_set(obj in copies)
-        context.view_layer.objects.active = copies[1]
-        viewport.show_colors(context)
-        if has_pictures(target):
-            viewport.show_materials(context)
-        viewport.look_at_selected_alone(context, np.concatenate([places[0], posed + right * step]))
+        self._preview(context, source, target, surfaces, found)
         return {"FINISHED"}
+
+    def _preview(
+        self,
+        context: bpy.types.Context,
+        source: bpy.types.Object,
+        target: bpy.types.Object,
+        surfaces: tuple[Surface, Surface],
+        found: Correspondence,
+    ) -> None:
+        """Show on the copy of the target what a transfer of textures would, if they are to be transferred."""
+        settings, shown = preview_settings(transfer_settings(context.scene.mobius)), copies(context)
+        if settings is None or shown is None or has_pictures(target):
+            return
+        try:
+            if show_preview(shown[1], read_through(source, target, surfaces, found, settings).carry()):
+                viewport.show_materials(context)
+        except (Refusal, MeshError) as error:
+            self.report({"WARNING"}, rpt_("No preview of the textures: {}").format(told(str(error))))
+
+
+def paint(source: bpy.types.Object, target: bpy.types.Object) -> tuple[tuple[Surface, Surface], Correspondence]:
+    """Paint both meshes of an aligned pair with one pattern, as active color attributes; return what they are.
+
+    Raises
+    ------
+    Refusal, MeshError
+        They are not what was aligned any more, or have no room for the colors.
+    """
+    surfaces = read_surface(source), read_surface(target)
+    found = stored_alignment.load(target, source, surfaces)
+    hues = _hues(source, target, surfaces, found)
+    for obj in (source, target):
+        require_room(obj, [], [PATTERN_COLOR])
+    on_source = surfaces[0].mesh.vertices / np.linalg.norm(np.ptp(surfaces[0].mesh.vertices, axis=0))
+    for obj, hue, there in zip((source, target), hues, (on_source, found.matrix() @ on_source), strict=True):
+        known = np.isfinite(hue)
+        write_color(obj, PATTERN_COLOR, pattern_color(np.where(known, hue, 0), there), known)
+    return surfaces, found
+
+
+def show(
+    context: bpy.types.Context, source: bpy.types.Object, target: bpy.types.Object
+) -> tuple[tuple[Surface, Surface], Correspondence]:
+    """Show an aligned pair as copies beside each other, in one pose, both upright or mirrored as the map says.
+
+    What it is, is returned.
+
+    Raises
+    ------
+    Refusal, MeshError
+        As `paint`.
+    """
+    surfaces, found = paint(source, target)
+    mirrored = target.data.mobius_alignment.reflected
+    places = [_world(obj) for obj in (source, target)]
+    some = found.matched if found.matched.any() else found.face >= 0
+    pose = similarity(places[1][some], (found.matrix() @ places[0])[some], reflected=mirrored)
+    right = viewport.axes_of(viewport.space_of(context))[0]
+    posed = places[1] @ pose[:3, :3].T + pose[:3, 3]
+    step = _beside(places[0] @ right, posed @ right)
+    viewport.look_at_all_again(context)
+    end(context)
+    moved = Matrix.Translation(right * step) @ Matrix(pose.tolist()) @ target.matrix_world
+    for obj, role, matrix in ((source, "source", source.matrix_world), (target, "target", moved)):
+        name = rpt_("{} (side by side, mirrored)") if mirrored and obj == target else rpt_("{} (side by side)")
+        add(context, obj, role, name.format(obj.name), matrix)
+    comparison.remember_selection(context)
+    look(context)
+    viewport.show_colors(context)
+    if has_pictures(target):
+        viewport.show_materials(context)
+    return surfaces, found
+
+
+def show_after(context: bpy.types.Context, source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Show the new alignment of a pair as the preferences say, where a 3D viewport is there to see it in.
+
+    Raises
+    ------
+    Refusal, MeshError
+        As `paint`.
+    """
+    kept = preferences(context)
+    how = kept.after_align if kept is not None else "side_by_side"
+    if how == "nothing" or viewport.space_of(context) is None:
+        return
+    if how == "pattern":
+        paint(source, target)
+        viewport.show_colors(context)
+    else:
+        show(context, source, target)
+        context.window_manager.mobius_view.matches = True
+
+
+def look(context: bpy.types.Context) -> None:
+    """Have the viewport look at the copies alone."""
+    found = copies(context)
+    if found is None:
+        return
+    context.view_layer.update()  # what is new can be selected from then on
+    for obj in context.view_layer.objects:
+        obj.select_set(obj in found)
+    context.view_layer.objects.active = found[1]
+    viewport.look_at_selected_alone(context, np.concatenate([_world(obj) for obj in found]))
 
 
 class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
@@ -96,13 +178,8 @@ class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove the copies and make the target active again."""
-        viewport.look_at_all_again(context)
-        end(context)
-        target = context.scene.mobius.target
-        if target is not None and target.name in context.view_layer.objects:
-            target.select_set(True)
-            context.view_layer.objects.active = target
+        """Remove the copies; what was selected and shown before is so again."""
+        leave(context)
         return {"FINISHED"}
 
 
@@ -122,30 +199,10 @@ def _hues(source: Any, target: Any, surfaces: Sequence[Surface], found: Correspo
     return layouts[0].disc, layouts[1].disc
 
 
-def is_shown(context: bpy.types.Context) -> bool:
-    """Return whether the scene holds a comparison."""
-    return COLLECTION in context.scene.collection.children
-
-
-def end(context: bpy.types.Context) -> None:
-    """Remove the copies, if there are any; the meshes stay."""
-    if is_shown(context):
-        _remove(context.scene.collection.children[COLLECTION])
-
-
-def end_for(mesh: bpy.types.Mesh) -> bool:
-    """Remove the copies from every scene that shows this mesh side by side, and return whether there were any."""
-    shown = [scene.collection.children.get(COLLECTION) for scene in bpy.data.scenes]
-    found = {x for x in shown if x is not None and x.is_editable and any(obj.data == mesh for obj in x.objects)}
-    for collection in found:
-        _remove(collection)
-    return bool(found)
-
-
-def _remove(collection: bpy.types.Collection) -> None:
-    for obj in list(collection.objects):
-        bpy.data.objects.remove(obj)
-    bpy.data.collections.remove(collection)
+def leave(context: bpy.types.Context) -> None:
+    """Remove the copies, and have viewports look as they did before."""
+    viewport.look_at_all_again(context)
+    end(context)
 
 
 def _beside(first: Floats, second: Floats) -> float:
@@ -157,17 +214,3 @@ def _world(obj: bpy.types.Object) -> Floats:
     """Return the vertices of an object in the world, (n, 3)."""
     matrix = np.array(obj.matrix_world)
     return seen_positions(obj) @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _copy(context: bpy.types.Context, obj: bpy.types.Object, matrix: Any) -> bpy.types.Object:
-    """Put an object with the same mesh into the collection of the comparison."""
-    collection = bpy.data.collections.get(COLLECTION)
-    if collection is None:
-        collection = bpy.data.collections.new(COLLECTION)
-    if not is_shown(context):
-        context.scene.collection.children.link(collection)
-    copy = bpy.data.objects.new(f"{obj.name} (side by side)", obj.data)
-    copy.matrix_world = matrix
-    copy.show_only_shape_key, copy.active_shape_key_index = obj.show_only_shape_key, obj.active_shape_key_index
-    collection.objects.link(copy)
-    return copy

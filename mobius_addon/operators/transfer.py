@@ -20,6 +20,7 @@ from ..attributes import (
     read_transfer,
     write_transfers,
 )
+from ..comparison import is_copy
 from ..evaluated import Shown, evaluated
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
@@ -172,7 +173,7 @@ def selected_targets(context: bpy.types.Context, source: bpy.types.Object) -> li
     Refusal
         None is selected, one has not been aligned, cannot be written or shares its mesh with another.
     """
-    targets = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source]
+    targets = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source and not is_copy(obj)]
     if not targets:
         raise Refusal(f"Select the meshes that shall receive what is on '{source.name}'")
     for obj in targets:

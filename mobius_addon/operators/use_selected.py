@@ -3,6 +3,8 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..comparison import is_copy
+
 
 class MOBIUS_OT_use_selected(bpy.types.Operator):
     """Make the active mesh the source and the other selected one the target."""
@@ -14,7 +16,7 @@ class MOBIUS_OT_use_selected(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow for two selected meshes, one of them active."""
-        chosen = [obj for obj in context.selected_objects if obj.type == "MESH"]
+        chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and not is_copy(obj)]
         if len(chosen) != 2 or context.object not in chosen:
             cls.poll_message_set(rpt_("Select two meshes, the source last: it is the active one"))
             return False

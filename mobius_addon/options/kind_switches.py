@@ -8,6 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..attributes import KINDS, ROWS, Kind
+from ..textures.nodes import picture_count
 
 
 def enum_identifier(kind: str) -> str:
@@ -77,6 +78,7 @@ def _counts(source: bpy.types.Object | None) -> dict[str, int] | None:
     """Return how many layers of each kind a source has, None if it cannot be said."""
     if source is None or source.type != "MESH" or source.mode != "OBJECT":
         return None
-    return {
+    layers = {
         kind.identifier: sum(len(x.access.names(source)) for x in ROWS if x.kind == kind.identifier) for kind in KINDS
     }
+    return layers | {"textures": picture_count(source)}

@@ -24,7 +24,7 @@ _handles: dict[str, Any] = {}
 def follow(context: bpy.types.Context) -> None:
     """Draw what the session's view asks for, and nothing else."""
     view = context.window_manager.mobius_view
-    wanted = {"matches": view.matches, "legend": view.matches or view.legend, "discs": view.discs, "names": view.discs}
+    wanted = {"matches": view.matches, "legend": view.legend, "discs": view.discs, "names": view.discs}
     for name, (space, kind, draw) in _PICTURES.items():
         if wanted[name] and name not in _handles:
             _handles[name] = space.draw_handler_add(draw, (), "WINDOW", kind)

@@ -11,7 +11,7 @@ from gpu_extras.batch import batch_for_shader
 
 from .. import stored_alignment
 from ..results import read_layout
-from .drawing import POINT_SIZE, draw_points, floats, free_corner, on_plane, write
+from .drawing import POINT_SIZE, draw_points, floats, free_room, on_plane, write
 from .matches import chosen_matches
 from .remembered import remember
 
@@ -61,6 +61,6 @@ def draw_names() -> None:
     if context.area.ui_type != "UV" or chosen is None:
         return
     scale = context.preferences.system.ui_scale
-    left, bottom = free_corner(context)
+    left, bottom, *_ = free_room(context)
     for row, (obj, color) in enumerate(zip(chosen, (SOURCE_COLOR, TARGET_COLOR), strict=True)):
         write(obj.name, left, bottom + 18 * scale * (1 - row), (*color, 1.0))

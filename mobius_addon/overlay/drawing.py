@@ -26,17 +26,22 @@ def write(text: str, x: float, y: float, color: tuple[float, ...] = (1, 1, 1, 1)
     blf.disable(0, blf.SHADOW)
 
 
-def free_corner(context: bpy.types.Context) -> tuple[float, float]:
-    """Return the lower left corner, in pixels of the region, that nothing of Blender's own lies over."""
+def free_room(context: bpy.types.Context) -> tuple[float, float, float, float]:
+    """Return left, bottom, right and top, in pixels of the region, of what nothing of Blender's own lies over."""
     scale = context.preferences.system.ui_scale
     over = context.preferences.system.use_region_overlap
     left = bottom = 20 * scale
+    right, top = context.region.width - 20 * scale, context.region.height - 20 * scale
     for region in context.area.regions:
         if over and region.type == "TOOLS" and region.alignment == "LEFT":
             left += region.width
+        elif over and region.type == "UI" and region.alignment == "RIGHT":
+            right -= region.width
+        elif over and region.type in ("HEADER", "TOOL_HEADER") and region.alignment == "TOP":
+            top -= region.height
         elif over and region.type.startswith(("ASSET_SHELF", "HUD")) and region.height > 1:
             bottom += region.height
-    return left, bottom
+    return left, bottom, right, top
 
 
 def draw_points(places: Floats, color: Floats, size: float) -> None:

@@ -13,7 +13,7 @@ from ...solver import MeshError
 from ...solver.surface.mesh import Floats
 from ...solver.surface.sampling import spread
 from .. import stored_alignment
-from ..heat_maps import MAP_MEASURES, measure, srgb
+from ..comparison import copies
 from ..mesh_data import Refusal, foreach, read_surface, seen_positions
 from ..results import read_layout
 from .drawing import LINE_WIDTH, POINT_SIZE, draw_points, floats, on_plane, opaque
@@ -34,7 +34,7 @@ class Matches:
     layout : (k, 3) float64
         Where they lie in the shared layout, as UV and 0; no rows if there is none.
     color : (k, 3) float64
-        sRGB of the confidence.
+        sRGB, another hue for each place.
     """
 
     source: Floats
@@ -55,15 +55,29 @@ def matches_of(source: bpy.types.Object, target: bpy.types.Object, count: int) -
         return None
     there = seen_positions(target)
     chosen = matched[spread(there[matched], count)]
-    confidence = measure("confidence", MAP_MEASURES)
-    shares = confidence.shares(found, *(surface.mesh for surface in surfaces))
     layout = read_layout(target)
+    flat = on_plane(layout.disc[chosen]) if layout else np.empty((0, 3))
     return Matches(
         (found.matrix() @ _lifted(source))[chosen],
         _lifted(target)[chosen],
-        on_plane(layout.disc[chosen]) if layout else np.empty((0, 3)),
-        srgb(shares[chosen], confidence.stops),
+        flat,
+        hues(flat if layout else there[chosen]),
     )
+
+
+def hues(places: Floats) -> Floats:
+    """Return sRGB colors, (k, 3), for places, (k, 3): the hues go once around their middle, in even steps.
+
+    Even steps keep many apart; every other one is lighter, so that neighbours are too.
+    """
+    off = places - places.mean(axis=0)
+    flat = off @ np.linalg.eigh(off.T @ off)[1][:, 1:]  # along the two longest axes
+    order = np.argsort(np.arctan2(flat[:, 0], flat[:, 1]), kind="stable")
+    hue = np.empty(len(places))
+    hue[order] = np.arange(len(places)) / len(places)
+    light = np.where(np.argsort(order) % 2 == 0, 0.0, 0.45)[:, None]
+    full = np.clip(np.abs((6 * hue[:, None] + np.array([0.0, 4.0, 2.0])) % 6 - 3) - 1, 0.0, 1.0)
+    return np.asarray(full + light * (1 - full), np.float64)
 
 
 def chosen_matches(context: bpy.types.Context) -> Matches | None:
@@ -82,10 +96,8 @@ def draw_matches() -> None:
     if not context.space_data.overlay.show_overlays:
         return
     found = chosen_matches(context)
-    chosen = stored_alignment.pair(context)
+    chosen = _ends(context)
     if found is None or chosen is None:
-        return
-    if not all(obj.visible_get(viewport=context.space_data) for obj in chosen):
         return
     view, scale = context.window_manager.mobius_view, context.preferences.system.ui_scale
     ends = [_moved(places, obj) for places, obj in zip((found.source, found.target), chosen, strict=True)]
@@ -101,6 +113,14 @@ def draw_matches() -> None:
     draw_points(np.concatenate(ends), np.concatenate([found.color, found.color]), POINT_SIZE * scale)
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
+
+
+def _ends(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object] | None:
+    """Return the objects on which the viewport shows the pair: copies side by side, or source and target themselves."""
+    for both in (copies(context), stored_alignment.pair(context)):
+        if both is not None and all(obj.visible_get(viewport=context.space_data) for obj in both):
+            return both
+    return None
 
 
 def _lifted(obj: bpy.types.Object) -> Floats:

@@ -8,6 +8,7 @@ from .last_transfer import MOBIUS_PT_last_transfer
 from .live import MOBIUS_PT_live
 from .main import MOBIUS_PT_main
 from .parts import MOBIUS_PT_parts
+from .proof import MOBIUS_PT_notes, MOBIUS_PT_proof
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
 from .show import MOBIUS_PT_pictures
@@ -24,6 +25,8 @@ _register, _unregister = bpy.utils.register_classes_factory(
     (
         MOBIUS_PT_main,
         MOBIUS_PT_result,
+        MOBIUS_PT_proof,
+        MOBIUS_PT_notes,
         MOBIUS_PT_parts,
         MOBIUS_PT_pictures,
         MOBIUS_PT_transfer,

@@ -20,8 +20,10 @@ class MOBIUS_PT_fitted(MobiusSubPanel, bpy.types.Panel):
         """Show where there is an alignment."""
         return stored_alignment.pair(context) is not None
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """Draw a button for either way."""
         column = self.layout.column(align=True)
+        settings = context.scene.mobius
+        column.enabled = stored_alignment.why_stale(settings.target, settings.source) is None
         column.operator(MOBIUS_OT_wrap.bl_idname, text="Source onto Target", icon="MOD_SHRINKWRAP").fitted = "source"
         column.operator(MOBIUS_OT_wrap.bl_idname, text="Target as Source", icon="SHAPEKEY_DATA").fitted = "target"

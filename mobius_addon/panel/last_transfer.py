@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import last_transfer
 from ..attributes import KINDS
 from ..last_transfer import LastTransfer, LayerWritten
-from .place import MobiusPanel
+from .place import MobiusPanel, draw_wrapped
 
 _NAMES = 8
 """So many layers of a kind have a row of their own."""
@@ -42,15 +40,6 @@ class MOBIUS_PT_last_transfer(MobiusPanel, bpy.types.Panel):
             layout.label(text=text, icon="QUESTION", translate=False)
         for sentence in found.warnings:
             draw_wrapped(layout.column(align=True), context, sentence, "ERROR")
-
-
-def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
-    """Draw a sentence in as many rows as the region's width needs."""
-    # a letter of Blender's font is 7 pixels wide on average, times the scale, and the icon takes five of them
-    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
-    letters = max(20, int((context.region.width if context.region is not None else 300) / (7 * scale)) - 5)
-    for number, row in enumerate(textwrap.wrap(sentence, letters)):
-        layout.label(text=row, icon="BLANK1" if number else icon, translate=False)
 
 
 def _found(context: bpy.types.Context) -> LastTransfer | None:

@@ -23,7 +23,8 @@ class MOBIUS_PT_live(MobiusSubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice and the button."""
-        settings = context.scene.mobius
         column = self.layout.column(align=True)
+        settings = context.scene.mobius
+        column.enabled = stored_alignment.why_stale(settings.target, settings.source) is None
         column.prop(settings, "live_attribute", text="")
         column.operator(MOBIUS_OT_live.bl_idname, icon="GEOMETRY_NODES").attribute = settings.live_attribute

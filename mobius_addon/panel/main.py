@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import topology_cache
-from ..jobs import Job, MOBIUS_OT_stop, describe_proof
+from ..jobs import Job, MOBIUS_OT_stop, describe_left, describe_proof
 from ..operators.align import MOBIUS_OT_align
 from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check
@@ -70,6 +70,8 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if line.selectable:
         button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         button.object_name, button.edit = obj.name, True
+    if line.remedy:
+        column.prop(settings, line.remedy, toggle=True)
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
@@ -77,4 +79,6 @@ def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
     row = layout.row(align=True)
     row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
     row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
-    layout.label(text=job.waits or describe_proof(job.progress) or iface_("ESC stops"), translate=False)
+    # always two rows, so that what is below stays where it is
+    layout.label(text=job.waits or describe_left(job) or iface_("ESC stops"), translate=False)
+    layout.label(text=describe_proof(job.progress), translate=False)

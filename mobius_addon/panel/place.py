@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 
 import bpy
@@ -31,3 +32,12 @@ def draw_sentence(layout: bpy.types.UILayout, sentence: str, icon: str) -> None:
     """Draw a sentence that may be too long for one row: what is wrong, then what to do about it."""
     for number, text in enumerate(sentence.split(": ", 1)):
         layout.label(text=text, icon="BLANK1" if number else icon, translate=False)
+
+
+def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
+    """Draw a sentence in as many rows as the region's width needs."""
+    # a letter of Blender's font is 7 pixels wide on average, times the scale, and the icon takes five of them
+    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
+    letters = max(20, int((context.region.width if context.region is not None else 300) / (7 * scale)) - 5)
+    for number, row in enumerate(textwrap.wrap(sentence, letters)):
+        layout.label(text=row, icon="BLANK1" if number else icon, translate=False)

@@ -9,7 +9,7 @@ from ..heat_maps import MAP_MEASURES
 from ..operators.clear import MOBIUS_OT_clear
 from ..operators.discs import MOBIUS_OT_show_discs
 from ..operators.heat_map import MOBIUS_OT_heat_map
-from ..operators.side_by_side import MOBIUS_OT_end_side_by_side, MOBIUS_OT_side_by_side, is_shown
+from ..preferences import preferences
 from .place import MobiusSubPanel
 
 
@@ -17,7 +17,7 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
     """See what the alignment is worth."""
 
     bl_label = "Show"
-    bl_order = 2
+    bl_order = 3
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -26,7 +26,8 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the switches and buttons."""
-        layout, view = self.layout, context.window_manager.mobius_view
+        layout, view, settings = self.layout, context.window_manager.mobius_view, context.scene.mobius
+        layout.enabled = stored_alignment.why_stale(settings.target, settings.source) is None
         column = layout.column()
         column.prop(view, "matches")
         if view.matches:
@@ -34,10 +35,6 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
             row.prop(view, "count")
             row.prop(view, "lines", slider=True)
         column = layout.column(align=True)
-        if is_shown(context):
-            column.operator(MOBIUS_OT_end_side_by_side.bl_idname, icon="LOOP_BACK", depress=True)
-        else:
-            column.operator(MOBIUS_OT_side_by_side.bl_idname, icon="MOD_MIRROR")
         if view.discs:
             column.prop(view, "discs", text="Discs in UV Editor", icon="UV", toggle=True)
         else:
@@ -48,4 +45,6 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
         for measure in MAP_MEASURES:
             row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
         layout.prop(view, "legend")
+        if (kept := preferences(context)) is not None:
+            layout.prop(kept, "after_align")
         layout.operator(MOBIUS_OT_clear.bl_idname, icon="TRASH")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import stored_alignment
 from ..operators.select_unmatched import MOBIUS_OT_select_unmatched
 from ..operators.transfer import MOBIUS_OT_transfer
 from ..options import SOURCE_MASK_OPTIONS, TRANSFER_OPTIONS, draw_kinds, draw_transfer
@@ -16,15 +17,18 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
     """Carry data from the source to the target."""
 
     bl_label = "Transfer"
-    bl_order = 3
+    bl_order = 2
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice of data and the button."""
         layout, settings = self.layout, context.scene.mobius
-        draw_kinds(layout, settings, settings.source)
         draw_preview(layout, context)
         column = layout.column()
         column.scale_y = 1.4
+        # targets that are selected tell by themselves what is stale
+        pair = stored_alignment.pair(context) if settings.carry_to == "target" else None
+        column.enabled = pair is None or stored_alignment.why_stale(pair[1], pair[0]) is None
+        draw_kinds(layout, settings, settings.source)
         hand_on(TRANSFER_OPTIONS, settings, column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER"))
 
 

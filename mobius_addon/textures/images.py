@@ -50,6 +50,11 @@ def tile_path(path: str, number: int) -> str:
     return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
 
 
+def turns_beside(path: Path) -> Path:
+    """Return the file that a transfer map's own has beside it, with what normal maps need."""
+    return path.with_name(f"{path.stem}_normals{path.suffix}")
+
+
 @contextmanager
 def _loaded(path: Path, like: Any) -> Iterator[Any]:
     """Lend a file as a picture with another one's color space."""

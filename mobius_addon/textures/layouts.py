@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
@@ -150,8 +149,3 @@ def tangent_frames(obj: bpy.types.Object, surface: Surface, uv: Floats) -> Tange
         return TangentFrames(normal[corners], tangent[corners], sign[corners])
     finally:
         bpy.data.meshes.remove(mesh)
-
-
-def at_triangles(surface: Surface, values: Any) -> Any:
-    """Return values at face corners, (c, ...), at the corners of triangles, (m, 3, ...)."""
-    return values[surface.triangle_corners]

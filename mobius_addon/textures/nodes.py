@@ -10,13 +10,13 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...solver.carry.textures import CLIP, EXTEND, REPEAT
+from ...solver.carry.textures import CLIP, EXTEND, MIRROR, REPEAT
 from ...solver.surface.mesh import Floats
 
 _SHADERS = ("BSDF_PRINCIPLED", "EMISSION", "BSDF_DIFFUSE", "BACKGROUND", "BSDF_TOON", "BSDF_GLOSSY")
 """Shaders that say what color a surface has, the most telling first."""
 
-_WRAPS = {"REPEAT": REPEAT, "EXTEND": EXTEND, "CLIP": CLIP, "MIRROR": REPEAT}
+_WRAPS = {"REPEAT": REPEAT, "EXTEND": EXTEND, "CLIP": CLIP, "MIRROR": MIRROR}
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,22 @@ class Found:
 
 Place = tuple[Any, tuple[Any, ...]]
 """A socket, and the group nodes that it is inside of."""
+
+
+def picture_count(obj: bpy.types.Object) -> int:
+    """Return how many pictures an object's materials have, quickly; without a material 1 for its colors, if any."""
+    materials = [slot.material for slot in obj.material_slots if slot.material is not None]
+    if not materials:
+        return int(bool(obj.data.attributes.default_color_name))
+    trees = [x.node_tree for x in materials if x.node_tree is not None]
+    images = set()
+    for tree in trees:  # grows by the groups in it
+        for node in tree.nodes:
+            if node.type == "TEX_IMAGE" and node.image is not None:
+                images.add(node.image)
+            elif node.type == "GROUP" and node.node_tree is not None and node.node_tree not in trees:
+                trees.append(node.node_tree)
+    return len(images)
 
 
 def shader_of(material: bpy.types.Material) -> Any:

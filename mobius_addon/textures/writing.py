@@ -13,8 +13,8 @@ from ..attributes.access import MAX_UV_MAPS, AttributeAccess
 from ..mesh_data import Refusal, foreach
 from .images import new_image
 from .layouts import rendered_uv
+from .made import DATA, Made, Textures
 from .nodes import shader_of
-from .reading import DATA, Made, Textures
 
 PROPERTY = "mobius_textures"
 """Custom property of materials and images that a transfer has made."""

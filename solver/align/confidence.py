@@ -19,6 +19,9 @@ from .agreement import descriptor_distance, log_stretch
 BOUND = 0.02
 """Share of the source's bounding box diagonal: the confidence is the probability of a smaller error."""
 
+MATCHED = 0.5
+"""Confidence from which on a point counts as matched: more likely than not it errs by less than `BOUND`."""
+
 NEAR_RIM = 0.05
 """Length over which the influence of the source's boundaries fades, in roots of the source's area."""
 
@@ -54,6 +57,16 @@ def unmatched_share(matched: float, count: int) -> float:
 def probability(seen: Floats, *, bent: bool) -> Floats:
     """Return the probability, (q,), of an error below `BOUND` from evidence, (q, 8), for maps that were bent or not."""
     return expit(seen @ (DENSE if bent else MOBIUS))
+
+
+def expected_error(confidence: Floats) -> Floats:
+    """Return the mean error, (q,), of points of a confidence, (q,) in [0, 1], as a share of the source's diagonal.
+
+    As if errors were distributed exponentially, of which the share `confidence` lies below `BOUND`; infinite at 0.
+    On 44 pairs of 13 kinds of surface its mean was 0.4 to 7.6 times the true mean error, in the median 2.5 times.
+    """
+    with np.errstate(divide="ignore"):
+        return -BOUND / np.log1p(-np.minimum(confidence, 1 - 1e-9))
 
 
 def evidence(

@@ -125,11 +125,11 @@ def _of_main_parts(
 ) -> tuple[Alignment, _Both]:
     """Return the alignment of the main parts of two surfaces, or of a piece of one of them, and what was aligned."""
     source, target, joined = with_lips_joined(source, target)
-    source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.1))
+    source, target, said = fitting_pieces(source, target, settings, clock.part(0, 0.05))
     pairs = own_landmarks(landmarks, source.cleaned, target.cleaned)
-    found = matched = roughly_aligned(source, target, settings, clock.part(0.1, 0.7), pairs)
+    found = matched = roughly_aligned(source, target, settings, clock.part(0.05, 0.45), pairs)
     if settings.refine == "dense":
-        part = clock.part(0.7, 0.95)
+        part = clock.part(0.45, 0.95)
         first = drafted_from(matched, part)
         found = bent_densely(matched, first, part, pairs)
         other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)

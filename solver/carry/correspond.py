@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..align.alignment import Alignment
+from ..align.confidence import MATCHED
 from ..align.whole import Whole
 from ..flatten.sphere import Flat
 from ..surface.mesh import Booleans, Floats, Integers, Places
@@ -82,7 +83,7 @@ def correspond(alignment: Alignment) -> Correspondence:
     found = Correspondence(
         face=face,
         barycentric=barycentric,
-        matched=confidence >= 0.5,
+        matched=confidence >= MATCHED,
         confidence=confidence,
         source_triangles=triangles,
         source_size=size,
@@ -98,7 +99,7 @@ def _of_all_parts(main: Correspondence, whole: Whole) -> Correspondence:
         main,
         face=np.where(others, whole.face, main.face),
         barycentric=np.where(others[:, None], whole.barycentric, main.barycentric),
-        matched=confidence >= 0.5,
+        matched=confidence >= MATCHED,
         confidence=confidence,
         part=whole.target.of_vertex,
         source_part=whole.source.of_vertex,

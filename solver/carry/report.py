@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..align.alignment import Alignment
+from ..align.confidence import expected_error
+from ..align.judgement import judge
 from ..align.whole import Whole
 from ..mobius import Mobius, SphereMobius
 from ..search.sphere_search import SphereSearchResult
@@ -23,6 +25,8 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
     `coverage` is the share of the target's area whose vertices are matched, `cut_to` the shares that were aligned of
     surfaces of which a piece was cut out. `value` to `rival` are about the whole discs, `overlap` about the parts that
     both surfaces show, where these are less; `rival_margin` is the latter's then.
+    `verdict` is "good", "check" or "doubtful" and why (`align.judgement`); `expected_error` the mean error to be
+    expected where the target is matched, as a share of the source's diagonal; null if nothing is.
     `parts` has a row for each part of the meshes, if there are several: what it is on either side (null: no
     counterpart), how certain the pair is, and how far apart they remain, in diagonals of the source.
     """
@@ -32,9 +36,17 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
     if alignment.whole is not None:
         areas = alignment.whole.target.mesh.vertex_areas
     decisive = alignment if parts is None else parts.alignment
+    judgement, matched = judge(alignment), areas * correspondence.matched
     return {
         "source": alignment.source.mesh.name,
         "target": alignment.target.mesh.name,
+        "verdict": judgement.level,
+        "concerns": [asdict(one) for one in judgement.concerns],
+        "notes": list(judgement.notes),
+        "expected_error": float(matched @ np.where(matched > 0, expected_error(correspondence.confidence), 0))
+        / float(matched.sum())
+        if matched.any()
+        else None,
         "value": alignment.value,
         "upper_bound": found.upper_bound,
         "gap": found.upper_bound - alignment.value,

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..align.alignment import Alignment
 from ..flatten.sphere import require_open
+from ..align.judgement import Judgement, coverage, judged
 from ..mobius import Mobius
 from .distance import EvenFlow, continuous_procrustes
 
@@ -27,6 +28,8 @@ class Figures:
         The Möbius map from the source's disc to the target's.
     mean_confidence : float
         Where the map claims anything.
+    coverage : float
+        Share of the target that is matched.
     distance : float
         Continuous Procrustes distance by this map.
     dense : bool
@@ -44,6 +47,7 @@ class Figures:
     theta: float
     reflected: bool
     mean_confidence: float
+    coverage: float
     distance: float
     dense: bool
     seconds: float
@@ -53,6 +57,11 @@ class Figures:
     def mobius(self) -> Mobius:
         """The Möbius map from the source's disc to the target's."""
         return Mobius(complex(*self.z), self.theta, self.reflected)
+
+    @property
+    def judgement(self) -> Judgement:
+        """How far the map can be believed, by itself."""
+        return judged(self.mean_confidence, self.coverage, self.warnings)
 
     @property
     def cost(self) -> float:
@@ -90,6 +99,7 @@ def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
         theta=mobius.theta,
         reflected=mobius.reflected,
         mean_confidence=alignment.mean_confidence,
+        coverage=coverage(alignment),
         distance=distance,
         dense=decisive.bending is not None,
         seconds=seconds,

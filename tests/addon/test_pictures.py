@@ -1,17 +1,21 @@
 """What is shown of an alignment: heat maps, matched points, the two discs, and both meshes side by side."""
 
+import itertools
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import QUICK, everything, make_sheet, positions
+from hypothesis import given
+from hypothesis import strategies as st
+from scenes import QUICK, bumps, everything, make_sheet, positions
 from scipy.spatial.transform import Rotation
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import overlay, results  # noqa: E402
 from mobius_extension.mobius_addon.attributes import OWN_NAMES, PATTERN_COLOR  # noqa: E402
+from mobius_extension.mobius_addon.comparison import COLLECTION  # noqa: E402
 from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     DISC_MEASURES,
     LARGEST_FACTOR,
@@ -20,8 +24,8 @@ from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
     shown_by,
     vertex_dilatations,
 )
-from mobius_extension.mobius_addon.operators.side_by_side import COLLECTION  # noqa: E402
-from mobius_extension.mobius_addon.overlay.matches import chosen_matches  # noqa: E402
+from mobius_extension.mobius_addon.overlay import legend  # noqa: E402
+from mobius_extension.mobius_addon.overlay.matches import chosen_matches, hues  # noqa: E402
 from mobius_extension.solver import Correspondence, TriangleMesh  # noqa: E402
 from mobius_extension.solver.carry.fitted import similarity  # noqa: E402
 
@@ -171,9 +175,9 @@ def test_handlers_are_there_only_while_something_is_drawn(aligned: tuple[Any, An
     view = bpy.context.window_manager.mobius_view
     assert set(overlay._handles) == set()
     view.matches = True
-    assert set(overlay._handles) == {"matches", "legend"}
+    assert set(overlay._handles) == {"matches"}
     view.discs = True
-    assert set(overlay._handles) == {"matches", "legend", "discs", "names"}
+    assert set(overlay._handles) == {"matches", "discs", "names"}
     view.matches = view.discs = False
     assert set(overlay._handles) == set()
     view.legend = True
@@ -196,7 +200,7 @@ def test_unregistering_removes_the_handlers() -> None:
 
 def test_the_legend_tells_what_is_shown(aligned: tuple[Any, Any]) -> None:
     shading = SimpleNamespace(type="SOLID", color_type="VERTEX")
-    view = SimpleNamespace(legend=True, matches=False)
+    view = SimpleNamespace(legend=True)
     context: Any = SimpleNamespace(
         space_data=SimpleNamespace(shading=shading),
         window_manager=SimpleNamespace(mobius_view=view),
@@ -206,12 +210,27 @@ def test_the_legend_tells_what_is_shown(aligned: tuple[Any, Any]) -> None:
     assert overlay.legends(context) == []
     bpy.ops.mobius.heat_map(measure="factor")
     assert [x.identifier for x in overlay.legends(context)] == ["factor"]
-    view.matches = True
-    assert [x.identifier for x in overlay.legends(context)] == ["factor", "confidence"]
     shading.color_type = "MATERIAL"  # the colors are not seen
-    assert [x.identifier for x in overlay.legends(context)] == ["confidence"]
-    bpy.context.scene.mobius.source = None
     assert overlay.legends(context) == []
+
+
+@given(
+    count=st.integers(1, 3),
+    width=st.floats(50, 3000),
+    height=st.floats(50, 2000),
+    scale=st.sampled_from([1.0, 1.5, 2.0]),
+)
+def test_legends_stay_on_screen_and_apart(count: int, width: float, height: float, scale: float) -> None:
+    room = 70.0, 20.0, width, height
+    found = legend.corners(count, *room, scale)
+    boxes = [(x, y, x + wide, y + legend.HEIGHT * scale) for x, y, wide in found]
+    for left, bottom, right, top in boxes:
+        assert room[0] <= left < right <= room[2] + 1e-9
+        assert room[1] <= bottom < top <= room[3] + 1e-9
+    for one, two in itertools.combinations(boxes, 2):
+        assert one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
+    if width >= 70 + 180 * scale and height >= 20 + (3 * 48 + 2 * 16) * scale:
+        assert len(found) == count
 
 
 # side by side
@@ -258,6 +277,57 @@ def test_side_by_side_shows_copies_in_one_pose(aligned: tuple[Any, Any]) -> None
     assert COLLECTION not in bpy.data.collections
     assert bpy.context.object == target
     assert not bpy.ops.mobius.end_side_by_side.poll()
+
+
+def test_what_was_selected_before_is_so_again_and_nobody_works_on_copies(aligned: tuple[Any, Any]) -> None:
+    source, target = aligned
+    other = make_sheet("Other", 3)
+    for obj in (source, other, target):
+        obj.select_set(obj != target)
+    bpy.context.view_layer.objects.active = other
+    bpy.ops.mobius.side_by_side()
+    left, right = bpy.context.selected_objects
+    assert {left.data, right.data} == {source.data, target.data}
+    assert not bpy.ops.mobius.use_selected.poll()
+    bpy.ops.mobius.transfer(kinds={"UV"})  # the copies show it too, and are nobody's other objects
+    assert target.data.mobius_transferred
+    assert "shares its mesh" not in target.data.mobius_transferred
+    settings = bpy.context.scene.mobius
+    settings.source = left
+    with pytest.raises(RuntimeError, match="is a copy of Side by Side: choose the object that it shows"):
+        bpy.ops.mobius.align()
+    settings.source = source
+    bpy.ops.mobius.side_by_side()
+    other.name = "Renamed"
+    bpy.ops.mobius.end_side_by_side()
+    assert bpy.context.selected_objects == [source]
+    assert bpy.context.object is None
+
+
+def test_a_mirrored_copy_is_shown_mirrored() -> None:
+    source, target = make_sheet("Source", 15), make_sheet("Target", 13, lambda x, y: bumps(-x, y))
+    settings = bpy.context.scene.mobius
+    settings.source, settings.target = source, target
+    bpy.ops.mobius.align(**ACCURATE | {"reflect": "always"})
+    bpy.ops.mobius.side_by_side()
+    left, right = bpy.data.collections[COLLECTION].objects
+    bpy.context.view_layer.update()
+    assert right.name == "Target (side by side, mirrored)"
+    assert left.matrix_world.determinant() > 0 > right.matrix_world.determinant()
+    # which has every bump on the same side as the source
+    there = np.array([right.matrix_world @ vertex.co for vertex in target.data.vertices])
+    there -= (there.min(axis=0) + there.max(axis=0)) / 2
+    assert np.abs(there[:, 2] - there[:, 2].min() - bumps(there[:, 0], there[:, 1])).max() < 0.05
+
+
+def test_matched_points_have_colors_of_their_own() -> None:
+    places = np.random.default_rng(2).normal(size=(20, 3)) * (3, 2, 0.1)
+    found = hues(places)
+    assert found.shape == (20, 3)
+    assert (found.min() >= 0, found.max() <= 1) == (True, True)
+    apart = np.linalg.norm(found[:, None] - found, axis=2)[np.triu_indices(20, 1)]
+    assert apart.min() > 0.2
+    assert hues(places[:1]).shape == (1, 3)
 
 
 def test_one_undo_takes_back_side_by_side(aligned: tuple[Any, Any]) -> None:

@@ -11,9 +11,13 @@ bpy: Any = pytest.importorskip("bpy", reason="Blender's module bpy is not instal
 
 from mobius_extension.mobius_addon.attributes import Carrier, TransferSettings, plan_transfer  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.textures.by_map import textures_by_map  # noqa: E402
 from mobius_extension.mobius_addon.textures.images import new_image, read_tiles  # noqa: E402
+from mobius_extension.mobius_addon.textures.nodes import picture_count  # noqa: E402
+from mobius_extension.mobius_addon.textures.reading import read_textures  # noqa: E402
 from mobius_extension.mobius_addon.textures.settings import TextureSettings  # noqa: E402
 from mobius_extension.solver import Correspondence  # noqa: E402
+from mobius_extension.solver.carry.textures import png_bytes  # noqa: E402
 from mobius_extension.solver.flatten.locate import TriangulatedDisc  # noqa: E402
 
 SIZE = 128
@@ -168,6 +172,129 @@ def test_packed_channels_and_alpha(sheets: tuple[Any, Any]) -> None:
     assert (
         next(n for n in new.nodes if n.type == "BSDF_PRINCIPLED").inputs["Alpha"].links[0].from_socket.name == "Alpha"
     )
+
+
+@pytest.mark.parametrize("floats", [False, True])
+def test_transparent_texels_give_no_color_to_those_beside_them(sheets: tuple[Any, Any], floats: bool) -> None:
+    """Cards of hair: white lines of one texel on black that cannot be seen."""
+    source, target = sheets
+    hair = np.zeros((SIZE, SIZE, 4), np.float32)
+    hair[:, ::4] = 1
+    if floats:
+        image = new_image("Hair", {1001: hair}, "Linear Rec.709")
+        image.alpha_mode = "PREMUL"
+    else:
+        image = new_image("Hair", {1001: (255 * hair).astype(np.uint8)}, "sRGB")
+    made = material("Hair", Base_Color=image)
+    tree = made.node_tree
+    node = next(node for node in tree.nodes if node.type == "TEX_IMAGE")
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+    source.data.materials.append(made)
+    carry(source, target, size=96)
+    found = shown(target, "Base Color")
+    scale = 1 if floats else 255
+    seen = found[:, :, 3] > 0.03 * scale
+    assert 0.3 < seen.mean() < 0.8
+    assert found[:, :, 3][seen].min() < 0.5 * scale
+    assert found[:, :, :3][seen].min() > 0.95 * scale
+
+
+@pytest.mark.parametrize("by", ["BUMP", "DISPLACEMENT"])
+def test_height_arrives_with_what_reads_it(sheets: tuple[Any, Any], by: str) -> None:
+    source, target = sheets
+    picture = smooth(1, 5)
+    made = material("Bumpy")
+    tree = made.node_tree
+    read = tree.nodes.new("ShaderNodeTexImage")
+    read.image = new_image("Height", {1001: picture}, "Non-Color")
+    if by == "BUMP":
+        node = tree.nodes.new("ShaderNodeBump")
+        values = {"Strength": 0.3, "Distance": 0.07}
+        tree.links.new(
+            node.outputs["Normal"], next(x for x in tree.nodes if x.type == "BSDF_PRINCIPLED").inputs["Normal"]
+        )
+    else:
+        node = tree.nodes.new("ShaderNodeDisplacement")
+        values = {"Midlevel": 0.4, "Scale": 0.02}
+        output = next(x for x in tree.nodes if x.type == "OUTPUT_MATERIAL")
+        tree.links.new(node.outputs["Displacement"], output.inputs["Displacement"])
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+    tree.links.new(read.outputs["Color"], node.inputs["Height"])
+    source.data.materials.append(made)
+    assert carry(source, target, size=SIZE).counts() == {"textures": 1}
+    close(shown(target, "Height")[:, :, 0], picture[::-1, ::-1, 0])
+    new = next(x for x in target.material_slots[0].material.node_tree.nodes if x.type == by)
+    assert {name: new.inputs[name].default_value for name in values} == pytest.approx(values)
+    assert new.inputs["Height"].links[0].from_node.label == "Height"
+    assert new.outputs[0].links[0].to_socket.name == ("Normal" if by == "BUMP" else "Displacement")
+
+
+def test_pictures_and_tiles_on_disk_are_read_as_packed_ones_are(sheets: tuple[Any, Any], tmp_path: Path) -> None:
+    """And the sentence where one of the tiles is gone."""
+    source, target = sheets
+    left, right = smooth(3, 3), smooth(3, 4)
+    for number, pixels in ((1001, left), (1002, right)):
+        (tmp_path / f"skin.{number}.png").write_bytes(png_bytes(pixels))
+    image = bpy.data.images.load(str(tmp_path / "skin.1001.png"))
+    image.source, image.filepath = "TILED", str(tmp_path / "skin.<UDIM>.png")
+    if 1002 not in {tile.number for tile in image.tiles}:
+        image.tiles.new(1002)
+    source.data.materials.append(material("Skin", Base_Color=image))
+    uv = source.data.uv_layers["UVMap"].uv
+    for polygon in source.data.polygons:
+        if polygon.center.x > 0:
+            for k in polygon.loop_indices:
+                uv[k].vector.x += 1
+    carry(source, target, size=SIZE)
+    found = shown(target, "Base Color")[::-1, ::-1, :3]
+    close(found[:, : SIZE // 2 - 1], left[:, : SIZE // 2 - 1])
+    close(found[:, SIZE // 2 + 1 :], right[:, SIZE // 2 + 1 :])
+    (tmp_path / "skin.1002.png").unlink()
+    with pytest.raises(Refusal, match=r"The tile 1002 of the picture .* is missing"):
+        carry(source, target)
+
+
+def test_a_transfer_map_of_several_tiles_draws_what_the_transfer_drew(sheets: tuple[Any, Any]) -> None:
+    source, _ = sheets
+    color, slopes = smooth(4, 6), smooth(3, 7) // 4 + 96
+    made = material("Skin", Base_Color=new_image("Color", {1001: color}, "sRGB"))
+    tree = made.node_tree
+    node = next(x for x in tree.nodes if x.type == "TEX_IMAGE")
+    tree.links.new(node.outputs["Alpha"], next(x for x in tree.nodes if x.type == "BSDF_PRINCIPLED").inputs["Alpha"])
+    read, bumps = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+    read.image = new_image("Slopes", {1001: slopes}, "Non-Color")
+    tree.links.new(read.outputs["Color"], bumps.inputs["Color"])
+    tree.links.new(bumps.outputs["Normal"], next(x for x in tree.nodes if x.type == "BSDF_PRINCIPLED").inputs["Normal"])
+    source.data.materials.append(made)
+    target = make_sheet("Wide", 17)
+    flat_uv(target, -1.0, 1.0)  # four tiles, turned
+    way = carrier(source, target)
+    settings = TextureSettings(size=SIZE, margin=0)
+    reading = read_textures(source, target, way, settings, keeps_map=True)
+    assert reading is not None
+    drawn = reading.carry()
+    assert drawn.transfer_map is not None
+    assert drawn.turns is not None
+    again = textures_by_map(source, target, (way.source, way.target), drawn.transfer_map, drawn.turns, settings)
+    assert again.notes == ()
+    assert again.alpha
+    assert (
+        [x.channel.identifier for x in again.made]
+        == [x.channel.identifier for x in drawn.made]
+        == ["base_color", "normal"]
+    )
+    for first, second in zip(drawn.made, again.made, strict=True):
+        assert sorted(first.tiles) == sorted(second.tiles) == [1001, 1002, 1011, 1012]
+        for number, pixels in first.tiles.items():
+            # at the border of a tile the neighbour that tells how wide a texel is may be missing
+            apart = np.abs(pixels.astype(int) - second.tiles[number])[2:-2, 2:-2]
+            assert np.percentile(apart, 99) <= 2
+            assert np.ptp(pixels[:, :, 0]) > 20
+    kept = {k: x for k, x in drawn.transfer_map.items() if k != 1002}
+    with pytest.raises(Refusal, match="the transfer map has no tile 1002"):
+        textures_by_map(source, target, (way.source, way.target), kept, drawn.turns, settings)
 
 
 def test_several_materials_and_tiles_become_one(sheets: tuple[Any, Any]) -> None:
@@ -340,3 +467,76 @@ def test_the_operator_carries_pictures(pair: tuple[Any, Any]) -> None:
     assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}) == {"FINISHED"}
     assert shown(target, "Base Color").shape[2] == 4
     assert [x.name for x in target.data.uv_layers if x.active_render] == ["UVMap"]
+
+
+def test_side_by_side_previews_the_pictures_before_they_are_transferred(pair: tuple[Any, Any]) -> None:
+    """On a copy with a mesh of its own: the target stays as it was, and the end takes everything away."""
+    source, target = pair
+    picture = smooth()
+    source.data.materials.append(material("Skin", Base_Color=new_image("Skin", {1001: picture}, "sRGB")))
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    settings = bpy.context.scene.mobius
+
+    def counts() -> tuple[int, ...]:
+        return tuple(len(x) for x in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.images))
+
+    before = counts()
+    settings.kinds = {"UV"}
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert bpy.data.collections["Mobius Side by Side"].objects[1].data == target.data
+    settings.kinds = {"UV", "TEXTURES"}
+    uv_maps = [x.name for x in target.data.uv_layers]
+    for _ in range(2):
+        assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+        copy = bpy.data.collections["Mobius Side by Side"].objects[1]
+        assert copy.data != target.data
+        seen = shown(copy, "Base Color")
+        assert seen.shape[:2] == (1024, 1024)
+        assert not target.material_slots
+        assert [x.name for x in target.data.uv_layers] == uv_maps
+        assert counts() == (before[0] + 2, *(x + 1 for x in before[1:]))
+    # what is transferred shows the same, in another size
+    settings.texture_size = 512
+    assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}, texture_size=512) == {"FINISHED"}
+    given = shown(target, "Base Color")
+    assert np.abs(seen.reshape(512, 2, 512, 2, 4).mean(axis=(1, 3)) - given)[given[:, :, 3] > 0].mean() < 4
+    assert bpy.ops.mobius.end_side_by_side() == {"FINISHED"}
+    assert counts() == (before[0], before[1], before[2] + 1, before[3] + 1)
+    # and Clear ends it too
+    for block in (target.data.materials[0], next(x for x in bpy.data.images if "mobius_textures" in x)):
+        (bpy.data.materials if isinstance(block, bpy.types.Material) else bpy.data.images).remove(block)
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert counts()[1] == before[1] + 1
+    bpy.context.view_layer.objects.active = target
+    assert bpy.ops.mobius.clear() == {"FINISHED"}
+    assert counts()[1:] == before[1:]
+
+
+def test_a_preview_that_cannot_be_is_a_warning(pair: tuple[Any, Any], tmp_path: Path) -> None:
+    source, target = pair
+    gone = bpy.data.images.new("Gone", 4, 4)
+    gone.source, gone.filepath = "FILE", str(tmp_path / "gone.png")
+    source.data.materials.append(material("Skin", Base_Color=gone))
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    bpy.context.scene.mobius.kinds = {"TEXTURES"}
+    meshes = len(bpy.data.meshes)
+    assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
+    assert bpy.data.collections["Mobius Side by Side"].objects[1].data == target.data
+    assert len(bpy.data.meshes) == meshes
+
+
+def test_the_panel_counts_the_pictures(sheets: tuple[Any, Any]) -> None:
+    source, _ = sheets
+    assert picture_count(source) == 0
+    layer = source.data.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
+    source.data.attributes.default_color_name = layer.name
+    assert picture_count(source) == 1
+    first = new_image("One", {1001: smooth()}, "sRGB")
+    source.data.materials.append(material("Skin", Base_Color=first, Emission_Color=first))
+    assert picture_count(source) == 1
+    group = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    group.nodes.new("ShaderNodeTexImage").image = new_image("Two", {1001: smooth()}, "sRGB")
+    made = material("Other")
+    made.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+    source.data.materials.append(made)
+    assert picture_count(source) == 2

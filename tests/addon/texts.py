@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 TRANSLATED = {"iface_", "rpt_", "n_"}
@@ -13,16 +14,19 @@ def of_classes() -> set[str]:
     import bpy
 
     found: set[str] = set()
-    owners = [
+    owners: list[Any] = [
         getattr(bpy.ops.mobius, name).get_rna_type() for name in dir(bpy.ops.mobius) if not name.endswith("preset_add")
     ]
     for rna in owners:
         found |= {rna.name, rna.description}
     for owner, name in ((bpy.types.Scene, "mobius"), (bpy.types.WindowManager, "mobius_view")):
         owners.append(owner.bl_rna.properties[name].fixed_type)
+    owners.append(bpy.types.Scene.bl_rna.properties["mobius"].fixed_type.properties["proof"].fixed_type)
+    if addon := next((x for x in bpy.types.AddonPreferences.__subclasses__() if x.__name__.startswith("MOBIUS")), None):
+        owners.append(addon.bl_rna)
     for rna in owners:
         for prop in rna.properties:
-            if prop.identifier not in ("rna_type", "name"):
+            if prop.identifier not in ("rna_type", "name", "bl_idname"):
                 found |= {prop.name, prop.description}
                 found |= {text for item in getattr(prop, "enum_items", ()) for text in (item.name, item.description)}
     found |= {getattr(bpy.types, name).bl_label for name in dir(bpy.types) if name.startswith("MOBIUS_PT_")}
@@ -37,11 +41,11 @@ def of_code() -> set[str]:
             for call in _calls(path):
                 name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
                 if name in TRANSLATED:
-                    found |= set(_constants(call.args[0]))
+                    found |= set(constants(call.args[0]))
                 elif name in ("label", "prop", "operator", "column") and "layout" not in path.stem:
                     for keyword in call.keywords:
                         if keyword.arg in ("text", "heading"):
-                            found |= set(_constants(keyword.value))
+                            found |= set(constants(keyword.value))
     return {text for text in found if text.strip()}
 
 
@@ -49,13 +53,41 @@ def _calls(path: Path) -> Iterator[ast.Call]:
     return (x for x in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(x, ast.Call))
 
 
-def _constants(node: ast.AST) -> Iterator[str]:
+def constants(node: ast.AST) -> Iterator[str]:
     """Texts that an argument can be: itself, or either branch of a condition."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.IfExp):
-        yield from _constants(node.body)
-        yield from _constants(node.orelse)
+        yield from constants(node.body)
+        yield from constants(node.orelse)
     elif isinstance(node, ast.BoolOp):
         for value in node.values:
-            yield from _constants(value)
+            yield from constants(value)
+
+
+def of_sentences() -> set[str]:
+    """Templates of what the solver refuses and what the add-on refuses or reports without Blender's own translation.
+
+    What is filled in is {}. Errors of the command line, of files and of damaged data are for those who read English.
+    """
+    found: set[str] = set()
+    for folder, errors in (("solver", ("MeshError",)), ("mobius_addon", ("Refusal",))):
+        for path in sorted((ROOT / folder).glob("**/*.py")):
+            if set(path.parts) & {"demo", "command_line", "files", "collection"} or path.name.startswith("german"):
+                continue
+            for call in _calls(path):
+                name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
+                said = call.args[:1] if name in errors else call.args[1:2] if name in ("report", "_report") else []
+                found |= {text for argument in said for text in _templates(argument)}
+    return {text for text in found if text.count(" ") > 2}
+
+
+def _templates(node: ast.AST) -> Iterator[str]:
+    """Texts that an expression can be, with {} for what is filled in; nothing of what calls another function."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    elif isinstance(node, ast.IfExp):
+        yield from _templates(node.body)
+        yield from _templates(node.orelse)

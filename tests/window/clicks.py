@@ -15,6 +15,7 @@ from typing import Any
 import hand
 import meanwhile
 import redoing
+import showing
 from hand import Wait, choose, click_on, escape, find, picture, redo, undo, until
 from mathutils import Euler, Vector
 
@@ -26,6 +27,8 @@ Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
 def steps() -> Wait:
     """Everything, with the seconds to wait in between."""
     source, target = set_the_scene()
+    # what is shown after Align has its own steps
+    bpy.context.preferences.addons[PACKAGE].preferences.after_align = "nothing"
     yield 1.0
     before = state(source), state(target)
 
@@ -82,6 +85,7 @@ def steps() -> Wait:
 
     yield from redoing.steps(PACKAGE, names)
     yield from meanwhile.steps(PACKAGE, names)
+    yield from showing.steps(PACKAGE, names)
 
     view = bpy.context.window_manager.mobius_view
     look = bpy.context.space_data.shading.type, bpy.context.space_data.shading.color_type
@@ -106,7 +110,6 @@ def steps() -> Wait:
     yield 0.5
 
     shading = bpy.context.space_data.shading
-    assert (shading.type, shading.color_type) == ("SOLID", "VERTEX") != look
     bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
     yield 0.5
     bpy.ops.mobius.clear("EXEC_DEFAULT", True)

@@ -18,11 +18,15 @@ ROOT = HERE.parents[1]
 GUI = Path(os.environ.get("MOBIUS_GUI", ROOT.parent / "shared/tools/gui_shot.sh"))
 ROOTS = Path(os.environ.get("BLENDER_ROOTS", "/opt"))
 
-PICTURES = (
-    *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
-    *("heat-map-factor", "side-by-side", "discs", "german"),
-    *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "cleared"),
-)
+PICTURES = {
+    "clicks": (
+        *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
+        *("heat-map-factor", "side-by-side", "discs", "german"),
+        *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "shown", "cleared"),
+    ),
+    "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
+}
+"""What each script leaves."""
 
 
 @pytest.fixture(scope="session")
@@ -37,7 +41,8 @@ def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("suite", ["sid", "trixie"])
-def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+@pytest.mark.parametrize("script", list(PICTURES))
+def test_a_person_uses_the_extension(suite: str, script: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     if os.environ.get("MOBIUS_WINDOW") != "1":
         pytest.skip("takes minutes of a machine's time: MOBIUS_WINDOW=1 asks for it")
     if not GUI.is_file():
@@ -55,12 +60,12 @@ def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest,
         "MOBIUS_SHOTS": str(shots),
     }
     done = subprocess.run(
-        [GUI, extension, HERE / "clicks.py", shots / "end.png"],
+        [GUI, extension, HERE / f"{script}.py", shots / f"{script}-end.png"],
         env=os.environ | settings | {"MOBIUS_SHOTS": str(shots)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     sys.stdout.write("".join(f"{line}\n" for line in done.stdout.splitlines() if line.startswith("[clicks]")))
     assert done.returncode == 0, done.stdout + done.stderr
     assert "[clicks] done" in done.stdout
     assert "Traceback" not in done.stdout, done.stdout
-    for name in PICTURES:
+    for name in PICTURES[script]:
         assert (shots / f"{name}.png").is_file(), name

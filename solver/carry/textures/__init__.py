@@ -8,9 +8,9 @@ read there, at the source's own UV.
 from .carrying import Carrying
 from .exr import exr_bytes
 from .layout import LayoutError, island_numbers, picture_size, place_in_tiles
-from .normal_maps import FLAT, TangentFrames, TurnedNormals
+from .normal_maps import FLAT, KeptTurns, TangentFrames, TurnedNormals, Turns
 from .paints import FromCorners, FromPictures, OnTarget, Paint, Stacked, Together
-from .picture import CLIP, EXTEND, REPEAT, Picture, encoded
+from .picture import CLIP, EXTEND, MIRROR, REPEAT, Picture, encoded
 from .png import png_bytes
 from .resample import Finder, InLayout, Resampled, Wanted, at_vertices, resample
 from .transfer_map import MapPaint, TransferMap
@@ -19,12 +19,14 @@ __all__ = [
     "CLIP",
     "EXTEND",
     "FLAT",
+    "MIRROR",
     "REPEAT",
     "Carrying",
     "Finder",
     "FromCorners",
     "FromPictures",
     "InLayout",
+    "KeptTurns",
     "LayoutError",
     "MapPaint",
     "OnTarget",
@@ -36,6 +38,7 @@ __all__ = [
     "Together",
     "TransferMap",
     "TurnedNormals",
+    "Turns",
     "Wanted",
     "at_vertices",
     "encoded",

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
-from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
+from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh
+from ...surface.walking import faces_beyond
 from ..correspond import Correspondence
 from ..interpolate import places
 
@@ -53,17 +52,5 @@ class Carrying:
 
     @cached_property
     def beyond(self) -> Integers:
-        """The source's face across the side opposite each corner, (f, 3); -1: none.
-
-        Across cuts too, where two sides of a boundary lie in one place and no third does: files cut surfaces open along
-        the seams of their layouts.
-        """
-        faces, count = self.source.faces, len(self.source.vertices)
-        twin = twin_sides(edges_of_sides(faces, count)[1])
-        rim = np.flatnonzero(twin < 0)
-        if len(rim):
-            _, same = np.unique(self.source.vertices, axis=0, return_inverse=True)
-            edges = np.sort(same.reshape(-1)[directed_edges(faces)[rim]], axis=1)
-            across = twin_sides(np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1))
-            twin[rim] = np.where(across >= 0, rim[across], -1)
-        return np.where(twin >= 0, twin // 3, -1).reshape(-1, 3)
+        """The source's face across the side opposite each corner, (f, 3); -1: none. See `faces_beyond`."""
+        return faces_beyond(self.source)

@@ -15,7 +15,7 @@ from .carrying import Carrying
 from .picture import Picture
 from .reference import TEXEL
 
-INTERFACE = 1
+INTERFACE = 2
 """Of texels.c: a library that says another number, or none, is not used."""
 
 _I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
@@ -31,7 +31,7 @@ class _Carrying(ctypes.Structure):
 class _Picture(ctypes.Structure):
     _fields_ = [
         *((name, _I64) for name in ("width", "height", "channels")),
-        *((name, _POINTER) for name in ("bytes", "floats", "table", "label")),
+        *((name, _POINTER) for name in ("bytes", "floats", "table", "opaque", "label")),
         ("wrap", _I64),
     ]
 
@@ -105,6 +105,7 @@ def sample(
         pixels.ctypes.data if in_bytes else None,
         None if in_bytes else pixels.ctypes.data,
         None if table is None else table.ctypes.data,
+        None if picture.opaque is None else picture.opaque.ctypes.data,
         label,
         picture.wrap,
     )

@@ -12,8 +12,8 @@ import numpy.typing as npt
 Pixels = npt.NDArray[Any]
 """(height, width, channels) uint8 or float32; the first row is the lowest, where v is 0."""
 
-REPEAT, EXTEND, CLIP = 0, 1, 2
-"""What lies beyond the edge of a picture: the picture again, its last texels, or nothing."""
+REPEAT, EXTEND, CLIP, MIRROR = 0, 1, 2, 3
+"""What lies beyond the edge of a picture: the picture again, its last texels, nothing, or the picture mirrored."""
 
 _FINE = 1 << 16
 """Steps in which linear values are looked up: the steepest part of sRGB rises by 1/20 of a byte in one."""
@@ -30,29 +30,37 @@ class Picture:
     table : (channels, 256) float32 or None
         What each byte of each channel stands for; None for floats.
     wrap : int
-        `REPEAT`, `EXTEND` or `CLIP`.
+        `REPEAT`, `EXTEND`, `CLIP` or `MIRROR`.
     label : (height, width) uint16 or None
         The island of a layout that each texel belongs to, 0 for none; None: all may be read from everywhere.
+    opaque : (height, width) uint8 or None
+        How much each texel counts between others: what cannot be seen has no say in the color beside it.
     """
 
     pixels: Pixels
     table: npt.NDArray[np.float32] | None
     wrap: int = EXTEND
     label: npt.NDArray[np.uint16] | None = None
+    opaque: npt.NDArray[np.uint8] | None = None
 
     @staticmethod
-    def of(pixels: Pixels, *, srgb: bool = False, wrap: int = EXTEND) -> Picture:
+    def of(
+        pixels: Pixels, *, srgb: bool = False, wrap: int = EXTEND, opaque: npt.NDArray[np.uint8] | None = None
+    ) -> Picture:
         """Return a picture of pixels, whose colors, if they are bytes, are linear or sRGB (a fourth channel never)."""
+        if opaque is not None:
+            opaque = np.ascontiguousarray(opaque)
         if pixels.dtype != np.uint8:
-            return Picture(np.ascontiguousarray(pixels, np.float32), None, wrap)
+            return Picture(np.ascontiguousarray(pixels, np.float32), None, wrap, opaque=opaque)
         table = np.stack([srgb_bytes() if srgb and k < 3 else linear_bytes() for k in range(pixels.shape[2])])
-        return Picture(np.ascontiguousarray(pixels), table, wrap)
+        return Picture(np.ascontiguousarray(pixels), table, wrap, opaque=opaque)
 
-    def values(self, pixels: Pixels) -> npt.NDArray[np.float32]:
-        """Return what some of the pixels, (q, channels), stand for."""
+    def values(self, pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return what some pixels, (q, channels), stand for; between two bytes linearly."""
         if self.table is None:
             return pixels
-        return np.stack([table[column] for table, column in zip(self.table, pixels.T, strict=True)], axis=1)
+        byte = np.arange(256)
+        return np.stack([np.interp(x, byte, table) for table, x in zip(self.table, pixels.T, strict=True)], axis=1)
 
 
 def encoded(values: npt.NDArray[np.float32], *, srgb: bool) -> npt.NDArray[np.uint8]:
@@ -86,31 +94,47 @@ def _to_srgb() -> npt.NDArray[np.uint8]:
     return (255 * share + 0.5).astype(np.uint8)
 
 
+_AROUND = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx)
+
+
 def with_margin(label: npt.NDArray[np.uint16], pixels: Pixels) -> None:
     """Label texels of the background, in place, that continue an island beside them, as those of a margin do.
 
-    They are half a texel nearer to what a face shows at its border. One continues an island if it differs from the
-    island's nearest texel by no more than twice what that differs from the next, and by rounding; black beside a face
-    does not.
+    They are half a texel nearer to what a face shows at its border. One continues an island if it differs from a texel
+    of it beside itself by no more than twice what that one differs from others beside it, and by rounding; black
+    beside a face does not.
     """
     height, width = label.shape
+    beside = np.zeros(label.shape, bool)
+    for dy, dx in _AROUND:
+        here, there = _shifted(height, dy), _shifted(width, dx)
+        beside[here[0], there[0]] |= label[here[1], there[1]] > 0
+    beside &= label == 0
+    at = np.flatnonzero(beside)
+    given = label.copy()
     rounding = 4 if pixels.dtype == np.uint8 else 0.0
-    flat, colors = label.reshape(-1), pixels.reshape(-1, pixels.shape[2])
-    found = []
-    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-        rows = slice(max(-2 * dy, 0), height - max(2 * dy, 0))
-        columns = slice(max(-2 * dx, 0), width - max(2 * dx, 0))
-        beside = label[rows.start + dy : rows.stop + dy, columns.start + dx : columns.stop + dx]
-        y, x = np.nonzero((label[rows, columns] == 0) & (beside > 0))
-        at = (y + rows.start) * width + x + columns.start
-        step = dy * width + dx
-        at = at[flat[at + 2 * step] == flat[at + step]]
-        here, near, next_one = (colors[at + k * step].astype(np.float32) for k in range(3))
-        goes_on = (np.abs(here - near) <= 2 * np.abs(near - next_one) + rounding).all(axis=1)
-        found.append((at[goes_on], flat[at + step][goes_on]))
-    for at, own in found:
-        free = flat[at] == 0
-        flat[at[free]] = own[free]
+    for dy, dx in _AROUND:
+        at = at[label.reshape(-1)[at] == 0]
+        y, x = np.divmod(at, width)
+        inside = (y + dy >= 0) & (y + dy < height) & (x + dx >= 0) & (x + dx < width)
+        y, x = y[inside], x[inside]
+        own = given[y + dy, x + dx]
+        y, x, own = y[own > 0], x[own > 0], own[own > 0]
+        near = pixels[y + dy, x + dx].astype(np.float32)
+        rough = np.full(near.shape, -1.0, np.float32)
+        for down, right in _AROUND:
+            row, column = y + dy + down, x + dx + right
+            there = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+            there[there] = given[row[there], column[there]] == own[there]
+            change = np.abs(near[there] - pixels[row[there], column[there]])
+            rough[there] = np.maximum(rough[there], change)
+        goes_on = (np.abs(pixels[y, x] - near) <= 2 * rough + rounding).all(axis=1) & (rough >= 0).all(axis=1)
+        label[y[goes_on], x[goes_on]] = own[goes_on]
+
+
+def _shifted(size: int, step: int) -> tuple[slice, slice]:
+    """Return where the rows, or columns, are that have one a step away, and where those are."""
+    return slice(max(-step, 0), size - max(step, 0)), slice(max(step, 0), size - max(-step, 0))
 
 
 def merged(label: npt.NDArray[np.uint16], parent: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:

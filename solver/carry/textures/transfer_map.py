@@ -68,6 +68,8 @@ class TransferMap:
     def texels(self, first: int, rows: int) -> tuple[Texels, int]:
         """Return the texels of some rows, as `reference.texels`, whose face is the page and whose place is u, v.
 
+        Their triangle is the number of the texel in the map, row by row.
+
         How u and v change is taken from the neighbour to which they change less: not from one beyond a seam.
         """
         _, width = self.pixels.shape[:2]
@@ -76,10 +78,11 @@ class TransferMap:
         material = np.rint(np.nan_to_num(own[:, :, 2], nan=NOWHERE)).astype(np.intp)
         tile = np.floor(np.nan_to_num(own[:, :, :2])).astype(np.intp)
         page = np.full((rows, width), -1)
-        for (number, which), wanted in self.pages.items():
+        for (slot, which), wanted in self.pages.items():
             row, column = divmod(which - 1001, 10)
-            page[(material == number) & (tile[:, :, 0] == column) & (tile[:, :, 1] == row)] = wanted
-        result["triangle"] = np.where(page >= 0, 0, -1)
+            page[(material == slot) & (tile[:, :, 0] == column) & (tile[:, :, 1] == row)] = wanted
+        number = np.arange(first * width, (first + rows) * width).reshape(rows, width)
+        result["triangle"] = np.where(page >= 0, number, -1)
         result["face"] = page
         result["place"] = own[:, :, :2] - tile
         around = self.pixels[max(first - 1, 0) : first + rows + 1]

@@ -13,10 +13,11 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-#define INTERFACE 1
+#define INTERFACE 2
 #define STEPS 4096    /* of one walk */
 #define INSIDE 1e-9   /* how far outside a face counts as in it, in barycentric coordinates */
 #define DEPTH 0.01    /* texels: islands that overlap by less only touch */
+#define TRACE 0.25    /* of a byte: how much a texel counts that cannot be seen */
 
 typedef struct {
     int32_t triangle, face;
@@ -42,8 +43,9 @@ typedef struct {
     const uint8_t *bytes;   /* NULL: floats */
     const float *floats;
     const float *table;     /* what each byte of each channel stands for, (channels, 256) */
+    const uint8_t *opaque;  /* (height, width), how much each texel counts; NULL: all the same */
     const uint16_t *label;  /* (height, width), 0: no island; NULL: any texel may be read */
-    int64_t wrap;           /* beyond the edge: 0 again from the other side, 1 the edge, 2 nothing */
+    int64_t wrap;           /* beyond the edge: 0 again from the other side, 1 the edge, 2 nothing, 3 again mirrored */
 } Picture;
 
 EXPORT int64_t mobius_texels_interface(void) { return INTERFACE; }
@@ -143,6 +145,82 @@ static double walk(const Carrying *c, int32_t start, const double *p, const doub
     return outside;
 }
 
+/* Squared distance from p to a face of the source, and the coordinates of its nearest point. */
+static double apart_from(const Carrying *c, int32_t face, const double *p, double *b) {
+    const int32_t *f = c->faces + 3 * (int64_t)face;
+    double e[2][3], q[3], r[3];
+    for (int d = 0; d < 3; d++) {
+        double first = c->source[3 * (int64_t)f[0] + d];
+        for (int k = 0; k < 2; k++) e[k][d] = c->source[3 * (int64_t)f[k + 1] + d] - first;
+        q[d] = p[d] - first;
+    }
+    double uu = dot(e[0], e[0]), uv = dot(e[0], e[1]), vv = dot(e[1], e[1]), qu = dot(q, e[0]), qv = dot(q, e[1]);
+    double square = uu * vv - uv * uv;
+    b[1] = (vv * qu - uv * qv) / square;
+    b[2] = (uu * qv - uv * qu) / square;
+    b[0] = 1 - b[1] - b[2];
+    if (!(square > 0 && b[0] >= 0 && b[1] >= 0 && b[2] >= 0)) {
+        double best = INFINITY;
+        for (int k = 0; k < 3; k++) {
+            int j = (k + 1) % 3;
+            double side[3], from[3], length = 0;
+            for (int d = 0; d < 3; d++) {
+                double start = c->source[3 * (int64_t)f[k] + d];
+                side[d] = c->source[3 * (int64_t)f[j] + d] - start;
+                from[d] = p[d] - start;
+            }
+            length = dot(side, side);
+            double s = length > 0 ? least(most(dot(from, side) / length, 0), 1) : 0;
+            for (int d = 0; d < 3; d++) r[d] = from[d] - s * side[d];
+            if (dot(r, r) < best) { best = dot(r, r); b[k] = 1 - s; b[j] = s; b[(k + 2) % 3] = 0; }
+        }
+        return best;
+    }
+    for (int d = 0; d < 3; d++) r[d] = q[d] - b[1] * e[0][d] - b[2] * e[1][d];
+    return dot(r, r);
+}
+
+/* Goes from a face to ever nearer ones among the neighbours and theirs; returns the squared distance. */
+static double descend(const Carrying *c, int32_t start, const double *p, int32_t *face, double *b) {
+    double best = apart_from(c, start, p, b);
+    *face = start;
+    for (int step = 0; step < STEPS; step++) {
+        int32_t here = *face;
+        const int32_t *around = c->beyond + 3 * (int64_t)here;
+        for (int k = 0; k < 3; k++) {
+            if (around[k] < 0) continue;
+            for (int j = -1; j < 3; j++) {
+                int32_t next = j < 0 ? around[k] : c->beyond[3 * (int64_t)around[k] + j];
+                double there[3];
+                if (next < 0 || next == here) continue;
+                double its = apart_from(c, next, p, there);
+                if (its < best) { best = its; *face = next; for (int d = 0; d < 3; d++) b[d] = there[d]; }
+            }
+        }
+        if (*face == here) break;
+    }
+    return best;
+}
+
+/* Whether a place on a face is farther from p than the farthest of the places that p lies between. */
+static int astray(const Carrying *c, int32_t face, const double *b, const double *p, const int32_t *v) {
+    double reach = 0, off = 0;
+    for (int k = 0; k < 3; k++) {
+        double square = 0;
+        for (int d = 0; d < 3; d++) {
+            double x = c->place[3 * (int64_t)v[k] + d] - p[d];
+            square += x * x;
+        }
+        reach = most(reach, square);
+    }
+    for (int d = 0; d < 3; d++) {
+        double x = -p[d];
+        for (int k = 0; k < 3; k++) x += b[k] * c->source[3 * (int64_t)c->faces[3 * (int64_t)face + k] + d];
+        off += x * x;
+    }
+    return off > reach;
+}
+
 /* Finds for each texel of some rows the target's triangle, and the source's face. `texel` has triangle -1 everywhere,
    `apart` is working memory, both (rows, width). Returns the number of texels in which triangles overlap. */
 EXPORT int64_t mobius_texels(const Carrying *c, int64_t first, int64_t rows, int64_t width, Texel *texel, double *apart) {
@@ -214,6 +292,15 @@ EXPORT int64_t mobius_texels(const Carrying *c, int64_t first, int64_t rows, int
             double its = walk(c, c->at[v[k]], p, n, &other, there);
             if (its < outside) { outside = its; found = other; for (int d = 0; d < 3; d++) b[d] = there[d]; }
         }
+        if (outside > INSIDE || astray(c, found, b, p, v)) {
+            double best = INFINITY;
+            outside = INFINITY;
+            for (int k = 0; k < 3; k++) {
+                int32_t other = -1;
+                double there[3], its = descend(c, c->at[v[k]], p, &other, there);
+                if (its < best) { best = its; found = other; for (int d = 0; d < 3; d++) b[d] = there[d]; }
+            }
+        }
         own->face = found;
         face = outside <= INSIDE ? found : -1;
         own->place[0] = (float)b[1];
@@ -239,14 +326,24 @@ static inline int64_t wrapped(int64_t i, int64_t size, int64_t wrap) {
     if (i >= 0 && i < size) return i;
     if (wrap == 2) return -1;
     if (wrap == 1) return i < 0 ? 0 : size - 1;
-    i %= size;
-    return i < 0 ? i + size : i;
+    int64_t period = wrap == 3 ? 2 * size : size;
+    i %= period;
+    if (i < 0) i += period;
+    return i < size ? i : period - 1 - i;
 }
 
-/* Adds the bilinear value at (x, y), in texels, from texels of one island alone; `own` 0: of any. Returns the share of
-   the weight that counted. */
-static inline double bilinear(const Picture *p, double x, double y, uint16_t own, double weight, double *sum) {
-    double fx = floor(x), fy = floor(y), sx = x - fx, sy = y - fy, total = 0;
+/* What a value between two bytes stands for. */
+static inline double decoded(const float *table, double byte) {
+    int64_t low = (int64_t)byte;
+    if (low > 254) return table[255];
+    return table[low] + (byte - low) * (table[low + 1] - table[low]);
+}
+
+/* Adds the bilinear value at (x, y), in texels, from texels of one island alone; `own` 0: of any. Between bytes it is
+   taken before they are decoded. Returns the share of the weight that counted. */
+static inline double bilinear(const Picture *p, double x, double y, uint16_t own, double *sum) {
+    double fx = floor(x), fy = floor(y), sx = x - fx, sy = y - fy, counted = 0;
+    double value[4] = {0, 0, 0, 0};
     for (int j = 0; j < 2; j++) {
         double wy = j ? sy : 1 - sy;
         if (wy <= 0) continue;
@@ -255,22 +352,28 @@ static inline double bilinear(const Picture *p, double x, double y, uint16_t own
             double w = wy * (i ? sx : 1 - sx);
             if (w <= 0) continue;
             int64_t column = wrapped((int64_t)fx + i, p->width, p->wrap);
-            if (row < 0 || column < 0) { if (!own) total += w; continue; }
+            if (row < 0 || column < 0) { if (!own) counted += w; continue; }
             int64_t at = row * p->width + column;
             if (own && p->label[at] != own) continue;
-            total += w;
-            w *= weight;
+            if (p->opaque) w *= (p->opaque[at] + TRACE) / 255;
+            counted += w;
             if (p->bytes)
-                for (int64_t k = 0; k < p->channels; k++) sum[k] += w * p->table[256 * k + p->bytes[at * p->channels + k]];
+                for (int64_t k = 0; k < p->channels; k++) value[k] += w * p->bytes[at * p->channels + k];
             else
-                for (int64_t k = 0; k < p->channels; k++) sum[k] += w * p->floats[at * p->channels + k];
+                for (int64_t k = 0; k < p->channels; k++) value[k] += w * p->floats[at * p->channels + k];
         }
     }
-    return total * weight;
+    if (counted <= 0) return 0;
+    for (int64_t k = 0; k < p->channels; k++) {
+        double mean = value[k] / counted;
+        sum[k] += counted * (p->bytes ? decoded(p->table + 256 * k, mean) : mean);
+    }
+    return counted;
 }
 
-static inline int64_t parts(double step, int64_t limit) {
-    double n = ceil(step - 0.05);
+/* How many points the mean over a side of a texel takes, from its length squared. */
+static inline int64_t parts(double square, int64_t limit) {
+    double n = ceil(sqrt(most(square - 1, 0)));
     return n < 1 ? 1 : n > limit ? limit : (int64_t)n;
 }
 
@@ -286,15 +389,15 @@ EXPORT void mobius_sample(const Picture *p, int64_t n, const Texel *texel, const
         double x = c[0] + t->place[0] * ux + t->place[1] * vx, y = c[1] + t->place[0] * uy + t->place[1] * vy;
         double ax = t->across[0] * ux + t->across[1] * vx, ay = t->across[0] * uy + t->across[1] * vy;
         double bx = t->down[0] * ux + t->down[1] * vx, by = t->down[0] * uy + t->down[1] * vy;
-        int64_t na = parts(sqrt(ax * ax + ay * ay), limit), nb = parts(sqrt(bx * bx + by * by), limit);
+        int64_t na = parts(ax * ax + ay * ay, limit), nb = parts(bx * bx + by * by, limit);
         uint16_t own = p->label ? island[t->face] : 0;
         double sum[4] = {0, 0, 0, 0}, total = 0;
         for (int64_t j = 0; j < nb; j++)
             for (int64_t k = 0; k < na; k++) {
                 double s = (k + 0.5) / na - 0.5, r = (j + 0.5) / nb - 0.5;
-                total += bilinear(p, x + s * ax + r * bx, y + s * ay + r * by, own, 1.0, sum);
+                total += bilinear(p, x + s * ax + r * bx, y + s * ay + r * by, own, sum);
             }
-        if (!(total > 0)) { total = bilinear(p, x, y, 0, 1.0, sum); }
+        if (!(total > 0)) { total = bilinear(p, x, y, 0, sum); }
         for (int64_t k = 0; k < p->channels; k++) out[i * p->channels + k] = (float)(sum[k] / total);
     }
 }

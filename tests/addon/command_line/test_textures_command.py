@@ -12,6 +12,7 @@ bpy: Any = pytest.importorskip("bpy", reason="Blender's module bpy is not instal
 
 from mobius_extension.mobius_addon import files  # noqa: E402
 from mobius_extension.mobius_addon.textures.images import new_image, read_tiles  # noqa: E402
+from mobius_extension.solver.carry.textures import exr_bytes  # noqa: E402
 
 COLOR = (200, 40, 90)
 
@@ -128,6 +129,67 @@ def test_a_transfer_map_is_kept(painted: Path, capsys: pytest.CaptureFixture[str
         assert status in (1, 2)
         assert words in err
         assert not (painted / "again.blend").exists()
+
+
+def test_a_transfer_map_carries_normals_and_transparency_as_the_transfer_did(
+    painted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the target's layout turned and the source's mirrored."""
+    bpy.ops.wm.open_mainfile(filepath=str(painted / "source.blend"))
+    obj = bpy.data.objects["Source"]
+    for corner in obj.data.uv_layers["UVMap"].uv:
+        corner.vector.x = 1 - corner.vector.x
+    tree = obj.material_slots[0].material.node_tree
+    shader = next(x for x in tree.nodes if x.type == "BSDF_PRINCIPLED")
+    y, x = np.mgrid[:64, :64] / 63.0
+    color = np.stack([200 + 0 * x, 40 + 100 * x, 90 + 50 * y, 255 - 155 * x], axis=2).astype(np.uint8)
+    slopes = np.stack([0.5 + 0.3 * x, 0.5 - 0.2 * y, 0.9 + 0 * x], axis=2)
+    node = next(x for x in tree.nodes if x.type == "TEX_IMAGE")
+    node.image = new_image("Color", {1001: color}, "sRGB")
+    tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+    read, bumps = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+    read.image = new_image("Slopes", {1001: np.round(255 * slopes).astype(np.uint8)}, "Non-Color")
+    tree.links.new(read.outputs["Color"], bumps.inputs["Color"])
+    tree.links.new(bumps.outputs["Normal"], shader.inputs["Normal"])
+    bpy.ops.wm.save_as_mainfile(filepath=str(painted / "source.blend"))
+    files.new_scene()
+    path = painted / "map.exr"
+    status, _, err = run(capsys, *arguments(painted, "out.blend", "--texture-map", path))
+    assert (status, err) == (0, "")
+    through = [
+        "transfer", painted / "source.blend", painted / "out.blend", "-o", painted / "again.blend",
+        "--only", "textures", "--use-texture-map", path,
+    ]  # fmt: skip
+    status, out, err = run(capsys, *through)
+    assert (status, err) == (0, "")
+    assert "2 textures" in out
+    pictures = []
+    for name in ("out.blend", "again.blend"):
+        bpy.ops.wm.open_mainfile(filepath=str(painted / name))
+        obj = next(x for x in bpy.data.objects if x.type == "MESH")
+        tree = obj.material_slots[0].material.node_tree
+        shader = next(x for x in tree.nodes if x.type == "BSDF_PRINCIPLED")
+        assert shader.inputs["Alpha"].links[0].from_socket.name == "Alpha"
+        pictures.append({x.label: read_tiles(x.image)[1001].astype(int) for x in tree.nodes if x.type == "TEX_IMAGE"})
+    assert sorted(pictures[0]) == sorted(pictures[1]) == ["Base Color", "Normal"]
+    for label, first in pictures[0].items():
+        assert np.ptp(first, axis=(0, 1))[[0, 3][label == "Base Color"]] > 50
+        apart = np.abs(first - pictures[1][label])
+        assert np.percentile(apart, 98) <= 2, label
+    # without what is kept beside it, a warning; with another map's, a refusal
+    beside = painted / "map_normals.exr"
+    beside.unlink()
+    (painted / "again.blend").unlink()
+    status, out, err = run(capsys, *through)
+    assert status == 0
+    assert "Normal is not carried: beside the transfer map there is no" in err
+    assert "1 texture " in out
+    beside.write_bytes(exr_bytes(np.zeros((32, 32, 4), np.float32)))
+    (painted / "again.blend").unlink()
+    status, _, err = run(capsys, *through)
+    assert status == 1
+    assert "does not belong to" in err
+    assert not (painted / "again.blend").exists()
 
 
 def test_nothing_is_written_on_failure(painted: Path, capsys: pytest.CaptureFixture[str]) -> None:

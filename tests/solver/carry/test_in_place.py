@@ -42,3 +42,28 @@ def test_a_map_between_surfaces_apart_is_left_as_it_is() -> None:
     # on the surface, and elsewhere than the map says: it has slid along itself
     slid = planar_correspondence(plane[0], TriangleMesh(plane[1].vertices * 0.9, plane[1].faces))
     assert settled(slid, source, target) is slid
+
+
+def test_from_what_is_settled_it_spreads_over_what_the_map_has_wrong() -> None:
+    """A patch that the map has elsewhere, and beneath it, nearer to some of it by chance, a second layer."""
+    plane = sheet(61)[0], sheet(31)[0]
+    source, target = (lifted(mesh) for mesh in plane)
+    count = len(source.vertices)
+    layers = TriangleMesh(
+        np.concatenate([source.vertices, source.vertices - [0, 0, 0.002]]),
+        np.concatenate([source.faces, source.faces[:, ::-1] + count]),
+    )
+    given = planar_correspondence(*plane)
+    wrong = np.hypot(*(target.vertices[:, :2] - [0.3, 0.2]).T) < 0.2
+    assert 0.01 < wrong.mean() < 0.05
+    elsewhere = planar_correspondence(plane[0], TriangleMesh(plane[1].vertices * 0.5, plane[1].faces))
+    given = replace(
+        given,
+        face=np.where(wrong, elsewhere.face, given.face),
+        barycentric=np.where(wrong[:, None], elsewhere.barycentric, given.barycentric),
+        source_triangles=layers.faces,
+        source_size=len(layers.vertices),
+    )
+    found = settled(given, layers, target)
+    assert np.linalg.norm(places(found, layers.vertices)[1] - target.vertices, axis=1).max() < 1e-9
+    assert (found.face < len(source.faces)).all()

@@ -6,7 +6,7 @@ from correspondences import planar_correspondence, sheet
 
 from solver import Correspondence, TriangleMesh
 from solver.carry.frames import local_similarities
-from solver.carry.textures import Carrying, FromCorners, InLayout, TangentFrames, TurnedNormals, Wanted, resample
+from solver.carry.textures import Carrying, FromCorners, InLayout, TangentFrames, TurnedNormals, Turns, Wanted, resample
 
 
 def frames(mesh: TriangleMesh, uv: np.ndarray, normals: np.ndarray) -> TangentFrames:
@@ -83,7 +83,7 @@ def test_a_normal_map_shows_the_same_normals_on_another_triangulation_layout_and
     paint = FromCorners((held / 2 + 0.5).reshape(-1, 3, 3))
     rotation = local_similarities(found, source, target)[0]
     size = (200, 200)
-    turned = TurnedNormals(paint, carrying, there[0], there[1], rotation)
+    turned = TurnedNormals(paint, Turns(carrying, there[0], there[1], rotation))
     got = resample(InLayout.of(carrying, own, size), size, [Wanted(turned, np.asarray)])
     shown = object_normals(got.pixels[0], got.known, there[1], carrying, own)
     position = FromCorners(np.broadcast_to(plane[0].vertices[source.faces], (*source.faces.shape, 3)))
@@ -105,6 +105,6 @@ def test_what_is_flat_stays_flat() -> None:
     there = [frames(mesh, x, mesh.vertex_normals()) for mesh, x in zip((source, bent), uv, strict=True)]
     paint = FromCorners(np.tile([0.5, 0.5, 1.0], (len(source.faces), 3, 1)))
     rotation = local_similarities(carrying.correspondence, source, bent)[0]
-    turned = TurnedNormals(paint, carrying, there[0], there[1], rotation)
+    turned = TurnedNormals(paint, Turns(carrying, there[0], there[1], rotation))
     found = resample(InLayout.of(carrying, uv[1], (50, 50)), (50, 50), [Wanted(turned, np.asarray)])
     assert np.abs(found.pixels[0][found.known] - [0.5, 0.5, 1]).max() < 1e-5

@@ -1,13 +1,21 @@
 """Pictures carried between surfaces that are known: what arrives in each texel is computed by other means."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from correspondences import planar_correspondence, sheet
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from solver import Correspondence, TriangleMesh
+from solver.carry.interpolate import places
 from solver.carry.textures import (
+    CLIP,
+    EXTEND,
+    MIRROR,
+    REPEAT,
     Carrying,
     FromCorners,
     FromPictures,
@@ -25,6 +33,8 @@ from solver.carry.textures import (
 )
 from solver.carry.textures.layout import in_texels
 from solver.carry.textures.margins import Margin
+from solver.carry.textures.paints import Page, at_corners
+from solver.carry.textures.picture import with_margin
 
 LINEAR = {"store": np.asarray}
 
@@ -53,7 +63,7 @@ def psnr(error: np.ndarray) -> float:
     return float(-10 * np.log10((error**2).mean()))
 
 
-def pictures(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, **options: bool) -> FromPictures:
+def pictures(pixels: np.ndarray, uv: np.ndarray, mesh: TriangleMesh, **options: Any) -> FromPictures:
     island = island_numbers(mesh.faces, uv)
     return FromPictures.of(
         [Picture.of(pixels, **options)], [uv], np.zeros(len(uv), int), [island], pixels.shape[2]
@@ -146,6 +156,23 @@ def test_no_texel_of_another_island_is_read() -> None:
             assert ((red == 1) ^ (green == 1)).all()
 
 
+def test_what_lies_beyond_the_edge() -> None:
+    """A layout twice as wide as the picture: again, mirrored, its edge, or nothing."""
+    source = sheet(9)[0]
+    own, wide = flat_uv(source), flat_uv(source)
+    wide[:, :, 0] = 2 * wide[:, :, 0]
+    pixels = smooth_picture(64, channels=1)
+    carrying = Carrying(planar_correspondence(source, source), source, source)
+    beyond = {
+        REPEAT: pixels, MIRROR: pixels[:, ::-1], EXTEND: np.repeat(pixels[:, -1:], 64, axis=1), CLIP: 0 * pixels
+    }  # fmt: skip
+    for wrap, expected in beyond.items():
+        paint = pictures(pixels, wide, source, wrap=wrap)
+        found = resample(InLayout.of(carrying, own, (64, 128)), (64, 128), [Wanted(paint, np.asarray)]).pixels[0]
+        assert np.abs(found[:, :63] - pixels[:, :63]).max() < 1e-5
+        assert np.abs(found[:, 65:] - expected[:, 1:]).max() < 1e-5, wrap
+
+
 def test_islands_on_top_of_each_other_read_the_same_texels() -> None:
     source = sheet(9)[0]
     uv = flat_uv(source)
@@ -211,7 +238,7 @@ def test_a_surface_that_its_file_cut_open_is_walked_over_as_one() -> None:
     assert np.abs(picture.pixels[0][:, :, 0] - u).max() < 1e-6
 
 
-@given(st.integers(0, 10**6), st.sampled_from([0, 1, 2]), st.booleans())
+@given(st.integers(0, 10**6), st.sampled_from([0, 1, 2, 3]), st.booleans())
 @settings(max_examples=15, deadline=None)
 def test_c_and_numpy_do_the_same(seed: int, wrap: int, mirrored: bool) -> None:
     if compiled.library() is None:
@@ -345,3 +372,79 @@ def test_size_by_the_density_of_the_source() -> None:
     assert picture_size(0.5 * 1024**2, half / 2) == 2048
     assert picture_size(1e12, half) == 8192
     assert picture_size(1.0, half) == 256
+
+
+def strip(colors: list[int], size: int, **options: object) -> np.ndarray:
+    """Bytes read from a row of colors, at `size` places from the middle of the first to that of the last."""
+    picture = Picture.of(np.array(colors, np.uint8)[None, :, None].repeat(3, axis=2), srgb=True, **options)  # type: ignore[arg-type]
+    texels = np.zeros(size, reference.TEXEL)
+    texels["place"][:, 0] = np.linspace(0, 1, size)
+    corners = np.array([[[0.0, 0.0], [len(colors) - 1.0, 0.0], [0.0, 1.0]]])
+    out = np.zeros((size, 3), np.float32)
+    paint = FromPictures((Page(picture, np.zeros(0, np.float32), corners, np.ones(1, np.uint16)),), np.zeros(1, int), 3)
+    paint(texels, out)
+    return encoded(out, srgb=True)[:, 0]
+
+
+def test_between_texels_bytes_are_interpolated_and_over_areas_light() -> None:
+    """Half way from black to white lies the grey that looks half as bright; the mean of both is half the light."""
+    assert np.abs(strip([0, 200], 11).astype(int) - np.linspace(0, 200, 11)).max() <= 1
+    source = sheet(9)[0]
+    uv = flat_uv(source)
+    checker = np.full((64, 64, 3), 255, np.uint8)
+    checker[::2] = 0
+    carrying = Carrying(planar_correspondence(source, source), source, source)
+    found = resample(
+        InLayout.of(carrying, uv, (32, 32)), (32, 32),
+        [Wanted(pictures(checker, uv, source, srgb=True), lambda x: encoded(x, srgb=True))],
+    )  # fmt: skip
+    assert (found.pixels[0] == 188).all()  # 1.055 * 0.5 ** (1 / 2.4) - 0.055
+
+
+def test_what_cannot_be_seen_gives_no_color() -> None:
+    """Black under an alpha of 0, beside hair, darkens none of it; where all is invisible the color is its own."""
+    found = strip([0, 200], 11, opaque=np.array([[0, 255]], np.uint8))
+    assert found[0] == 0
+    assert (found[1:] >= 198).all()
+    assert (strip([90, 90], 5, opaque=np.zeros((1, 2), np.uint8)) == 90).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("loops", [reference, compiled])
+def test_no_texel_goes_astray_on_a_crumpled_surface(seed: int, loops: object) -> None:
+    """Where lines along normals miss the faces nearby they meet others far away; those are not what a texel shows."""
+    if loops is compiled and compiled.library() is None:
+        pytest.skip("the compiled kernels are not installed")
+    plane = sheet(21)[0], sheet(9)[0]
+    found = planar_correspondence(*plane)
+    source = crumpled(plane[0], seed)
+    target = TriangleMesh(places(found, source.vertices)[1], plane[1].faces)
+    texels, _ = loops.texels(Carrying(found, source, target), in_texels(flat_uv(plane[1]), 128, 128), 0, 128, 128)  # type: ignore[attr-defined]
+    texels = texels.reshape(-1)[texels.reshape(-1)["triangle"] >= 0]
+    middle = at_corners(target.vertices[target.faces], texels["triangle"], texels["corner"])
+    there = at_corners(source.vertices[source.faces], texels["face"], texels["place"])
+    ends = target.vertices[target.faces[texels["triangle"]]]
+    assert (np.linalg.norm(there - middle, axis=1) <= np.linalg.norm(ends - middle[:, None], axis=2).max(axis=1)).all()
+
+
+def crumpled(mesh: TriangleMesh, seed: int) -> TriangleMesh:
+    """A sheet thrown into folds as high as they are wide."""
+    shift = np.random.default_rng(seed).normal(scale=0.06, size=mesh.vertices.shape)
+    return TriangleMesh(mesh.vertices + shift, mesh.faces)
+
+
+def test_a_margin_that_goes_on_is_read_and_a_background_is_not() -> None:
+    """Also at corners of an island, and where it is one texel wide; black around it is no margin."""
+    y, x = np.mgrid[:20, :20]
+    color = (6 * x + 4 * y).astype(np.uint8)[:, :, None].repeat(3, axis=2)
+    island = np.zeros((20, 20), np.uint16)
+    island[5:12, 5:12] = 7
+    island[12:16, 8] = 7
+    around = ndimage.binary_dilation(island > 0, np.ones((3, 3)))
+    label = island.copy()
+    with_margin(label, color)
+    assert (label[around] == 7).all()
+    assert not label[~around].any()
+    label = island.copy()
+    with_margin(label, np.where(island[:, :, None] > 0, color + 100, 0).astype(np.uint8))
+    assert (label == island).all()
