@@ -214,6 +214,7 @@ class JobOperator:
             if self._job.error is not None:
                 raise self._job.error
             self.finish(context, self._job.result)
+            redraw(context)
         except (Refusal, MeshError) as refusal:
             return self._refused(refusal)
         return {"FINISHED"}

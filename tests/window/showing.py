@@ -27,7 +27,9 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     yield from until(lambda: jobs.Job.current is None)
     yield from until(is_alone)
     assert bpy.context.window_manager.mobius_view.matches
-    yield from picture("shown", 3.0)
+    for _ in range(4):  # new panels unfold step by step
+        yield 0.5
+    yield from picture("shown")
     bpy.ops.ed.undo()
     yield from until(lambda: looks() == before)
     bpy.ops.ed.redo()
