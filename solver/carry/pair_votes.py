@@ -1,9 +1,10 @@
 """Which pairs of points a map is bent through: those that contradict it beyond its confidence are outvoted.
 
-A map that is right with probability c within `BOUND` is taken to err by more than x with probability (1 - c)^(x / BOUND)
-(an exponential tail through the one value that is known). A pair that asks for a longer move than that leaves a chance
-of `WRONG` is more likely a wrong click than right, and k pairs that ask for the same are k wrong clicks: their chance is
-`WRONG`^k. So a pair alone bends a certain map a little, an uncertain one far, and several that agree bend any map.
+A map that is right with probability c within `BOUND` is taken to err by more than x with probability
+(1 - c)^(x / BOUND), an exponential tail through the one value that is known. A pair that asks for a longer move than
+that leaves a chance of `WRONG` is more likely a wrong click than right, and k pairs that ask for the same are k wrong
+clicks: their chance is `WRONG`^k. So a pair alone bends a certain map a little, an uncertain one far, and several that
+agree bend any map.
 """
 
 from __future__ import annotations

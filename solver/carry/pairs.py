@@ -19,7 +19,11 @@ from .correspond import Correspondence
 from .pair_votes import outvoted
 
 REACH = 0.15
-"""Distance, in diagonals of the source, from which on a pair moves nothing."""
+"""Distance, in diagonals of the source, from which on a pair moves nothing.
+
+Where errors vary slowly, as those of a face's conformal map, farther is better: ten pairs leave 0.60, 0.55 and 0.39 of
+0.67 % at 0.1, 0.15 and 0.3. Where they do not, as at the landmarks of teeth that are bent already, the other landmarks
+lose: 1.60, 1.61 and 1.70 of 1.60 %."""
 
 STEEPEST = 2.11
 """Largest slope of `_bump` over a reach of 1: at a distance of 1/4, 20 / 4 (3/4)^3."""
@@ -190,7 +194,7 @@ class _Walk:
         return np.where((face >= 0)[:, None], found, np.nan)
 
     def way(self, faces: Integers, weights: Floats, shares: Floats, end: int, goal: Floats) -> Integers | None:
-        """Return the vertices, (k,), along edges from a mean of points, (3,), to another; None if no way leads there."""
+        """Return the vertices, (k,), along edges from a mean of points, (3,), to another; None: no way leads there."""
         heavy = int(np.argmax(shares))
         if (faces[shares > 0] < 0).any():
             return None
@@ -297,7 +301,7 @@ class _Flow:
         return np.einsum("lqk,qk->ql", gates[:, corners], weights)
 
     def _towards(self, centres: Floats, ahead: list[Floats]) -> Floats:
-        """Return where to each pair's point goes next, (l, 3): straight, or by the places of a detour that are ahead."""
+        """Return where to each pair's point goes next, (l, 3): straight, or by the places of a detour."""
         result = self.goals - centres
         for k, reach in enumerate(self.reach):
             while len(ahead[k]) and np.linalg.norm(ahead[k][0] - centres[k]) < reach / 8:
@@ -333,16 +337,12 @@ def _bump(distance: Floats) -> Floats:
     return near**4 * (4 * distance + 1)
 
 
-def _folded(
-    walk: _Walk, target: TriangleMesh, face: Integers, places: tuple[Floats, Floats], moved: Booleans
-) -> int:
+def _folded(walk: _Walk, target: TriangleMesh, face: Integers, places: tuple[Floats, Floats], moved: Booleans) -> int:
     """Return how many of the target's triangles have turned over on the source, from some places to others."""
     touched = target.faces[moved[target.faces].any(axis=1) & (face[target.faces] >= 0).all(axis=1)]
     if not len(touched):
         return 0
-    before, after = (
-        np.cross(x[touched[:, 1]] - x[touched[:, 0]], x[touched[:, 2]] - x[touched[:, 0]]) for x in places
-    )
+    before, after = (np.cross(x[touched[:, 1]] - x[touched[:, 0]], x[touched[:, 2]] - x[touched[:, 0]]) for x in places)
     # against the surface before, and against the way that the triangle itself faced where it lies flat on it
     normals = walk.normals[face[touched[:, 0]]]
     facing = np.einsum("td,td->t", before, normals)

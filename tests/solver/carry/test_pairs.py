@@ -147,7 +147,8 @@ def test_a_goal_across_an_opening_is_reached_around_it():
 
 def test_pairs_on_parts_that_do_not_belong_together_are_never_followed():
     two = TriangleMesh(
-        np.vstack([MESH.vertices, MESH.vertices + [3, 0, 0]]), np.vstack([MESH.faces, MESH.faces + len(MESH.vertices)])
+        np.vstack([MESH.vertices, MESH.vertices + np.array([3.0, 0.0, 0.0])]),
+        np.vstack([MESH.faces, MESH.faces + len(MESH.vertices)]),
     )
     found = through_pairs(
         identity(two, 0.1), two, two, pairs(two, two, [((3.1, 0), (0, 0)), ((3.1, 0.1), (3.0, 0.1))]), follow_all=True
