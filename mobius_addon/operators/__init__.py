@@ -11,6 +11,7 @@ from . import (
     clear,
     conformal_transfer,
     discs,
+    example,
     flatten,
     heat_map,
     live,
@@ -25,6 +26,9 @@ from . import (
 
 _register, _unregister = register_factory(
     (
+        example.MOBIUS_OT_load_example,
+        example.MOBIUS_OT_remove_example,
+        example.MOBIUS_OT_guide,
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,

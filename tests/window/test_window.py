@@ -36,8 +36,11 @@ def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.timeout(1800)
+@pytest.mark.parametrize(("script", "pictures"), [("clicks.py", PICTURES), ("pairing.py", ("point-pairs",))])
 @pytest.mark.parametrize("suite", ["sid", "trixie"])
-def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_a_person_uses_the_extension(
+    suite: str, script: str, pictures: tuple[str, ...], request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     if os.environ.get("MOBIUS_WINDOW") != "1":
         pytest.skip("takes minutes of a machine's time: MOBIUS_WINDOW=1 asks for it")
     if not GUI.is_file():
@@ -55,12 +58,12 @@ def test_a_person_uses_the_extension(suite: str, request: pytest.FixtureRequest,
         "MOBIUS_SHOTS": str(shots),
     }
     done = subprocess.run(
-        [GUI, extension, HERE / "clicks.py", shots / "end.png"],
+        [GUI, extension, HERE / script, shots / f"end-{script}.png"],
         env=os.environ | settings | {"MOBIUS_SHOTS": str(shots)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     sys.stdout.write("".join(f"{line}\n" for line in done.stdout.splitlines() if line.startswith("[clicks]")))
     assert done.returncode == 0, done.stdout + done.stderr
     assert "[clicks] done" in done.stdout
     assert "Traceback" not in done.stdout, done.stdout
-    for name in PICTURES:
+    for name in pictures:
         assert (shots / f"{name}.png").is_file(), name
