@@ -13,6 +13,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Alignment, Correspondence, report
+from ..solver.carry.inverse import inverse_figures
 from . import earlier_version
 from .fingerprints import fingerprint_of
 from .mesh_data import Refusal, Surface
@@ -49,6 +50,30 @@ def store(
     kept.seconds = sum(alignment.seconds.values())
     kept.report = json.dumps(about)
     kept.packed = _packed(correspondence)
+    kept.property_unset("unbent")
+    kept.property_unset("pairs")
+
+
+def store_inverse(
+    source: bpy.types.Object, target: bpy.types.Object, back: Correspondence, surfaces: tuple[Surface, Surface]
+) -> None:
+    """Keep the inverse of what the target's mesh keeps on the source's mesh, with what was proved of it.
+
+    `back` is that map, `surfaces` are source and target.
+    """
+    there, kept = target.data.mobius_alignment, source.data.mobius_alignment
+    areas = surfaces[0].mesh.vertex_areas
+    coverage = float(areas[back.matched].sum() / areas.sum())
+    kept.property_unset("source")
+    kept.source_name, kept.source_size = target.name, len(surfaces[1].mesh.vertices)
+    kept.source_fingerprint, kept.target_fingerprint = there.target_fingerprint, there.source_fingerprint
+    for name in ("value", "upper_bound", "certified", "reflected", "seconds"):
+        setattr(kept, name, getattr(there, name))
+    kept.coverage = coverage
+    figures = _parsed(there.report)
+    if figures is not None:
+        kept.report = json.dumps(inverse_figures(figures, coverage, float(areas @ back.confidence / areas.sum())))
+    kept.packed = _packed(back)
     kept.property_unset("unbent")
     kept.property_unset("pairs")
 

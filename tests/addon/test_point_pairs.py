@@ -154,3 +154,31 @@ def test_a_stale_map_takes_no_pair(aligned):
     with pytest.raises(RuntimeError, match="has been edited since"):
         bpy.ops.mobius.add_pair("EXEC_DEFAULT", source_point=(0, 0, 0), target_point=(0, 0, 0))
     assert not point_pairs.listed(source, target)
+
+
+def test_swapping_keeps_the_map_the_other_way(aligned):
+    source, target = aligned
+    there = carried(*aligned)
+    assert bpy.ops.mobius.swap("EXEC_DEFAULT", True) == {"FINISHED"}
+    settings = bpy.context.scene.mobius
+    assert (settings.source, settings.target) == (target, source)
+    assert stored_alignment.pair(bpy.context) == (target, source)
+    back = carried(target, source)
+    # there and back, by the nearest vertex: within a square of the sheet
+    inside = np.abs(positions(target)[:, :2]).max(axis=1) < 0.8
+    for vertex in np.flatnonzero(inside):
+        near = np.linalg.norm(positions(source) - there[vertex], axis=1).argmin()
+        assert np.linalg.norm(back[near] - positions(target)[vertex]) < 0.15
+    figures = stored_alignment.figures(source)
+    assert figures["source"] == "Target"
+    assert figures["coverage"] > 0.8
+    assert bpy.ops.mobius.swap() == {"FINISHED"}
+    assert (carried(*aligned) == there).all()
+
+
+def test_swapping_a_stale_pair_says_that_the_map_is_lost(aligned):
+    source, target = aligned
+    target.data.vertices[0].co.x += 0.5
+    target.data.update()
+    assert bpy.ops.mobius.swap() == {"FINISHED"}
+    assert not source.data.mobius_alignment.target_fingerprint
