@@ -10,8 +10,8 @@ from ..surface.nearest import SurfacePoints
 from .correspond import Correspondence
 
 ALIKE = 0.03
-"""A difference of 1 between unit normals counts as this share of the diagonal, so that of two lips that touch each keeps
-to its own."""
+"""A difference of 1 between unit normals counts as this share of the diagonal, so that of two lips that touch each
+keeps to its own; `bend.plate` counts it so, in roots of the area."""
 
 
 def inverted(found: Correspondence, source: TriangleMesh, target: TriangleMesh) -> Correspondence:
