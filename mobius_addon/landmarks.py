@@ -55,13 +55,26 @@ def from_scene(
     return np.array([[side[name] for side in named] for name in common], np.intp)
 
 
+def paired_empties(
+    source: bpy.types.Object, target: bpy.types.Object
+) -> dict[str, tuple[bpy.types.Object, bpy.types.Object]]:
+    """Return the empties parented to two objects that have equal names, a number like .001 at the end aside."""
+    one, other = _named_empties(source), _named_empties(target)
+    return {name: (one[name], other[name]) for name in one if name in other}
+
+
+def _named_empties(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
+    """Return the empties parented to an object by their names; of several that have one name, the first."""
+    children = sorted(obj.children, key=lambda child: child.name, reverse=True)
+    return {re.sub(r"\.\d{3,}$", "", child.name): child for child in children if child.type == "EMPTY"}
+
+
 def _empties(obj: bpy.types.Object) -> dict[str, Floats]:
     """Return where the empties parented to an object are, by their names, in the space of its surface."""
     inverse = obj.matrix_world.inverted_safe()
     return {
-        re.sub(r"\.\d{3,}$", "", child.name): mirrored(obj, np.array(inverse @ Vector(child.matrix_world.translation)))
-        for child in sorted(obj.children, key=lambda child: child.name, reverse=True)
-        if child.type == "EMPTY"
+        name: mirrored(obj, np.array(inverse @ Vector(child.matrix_world.translation)))
+        for name, child in _named_empties(obj).items()
     }
 
 

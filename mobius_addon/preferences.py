@@ -41,6 +41,9 @@ class MOBIUS_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the settings."""
         layout = self.layout
+        row = layout.row()
+        row.label(text="In the 3D viewport: press N, tab Möbius", icon="INFO")
+        row.operator("mobius.guide", icon="HELP")
         layout.use_property_split = True
         layout.prop(self, "time_limit")
         layout.prop(self, "check_while_drawing")

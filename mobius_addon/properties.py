@@ -70,6 +70,8 @@ class MobiusAlignment(bpy.types.PropertyGroup):
     seconds: bpy.props.FloatProperty()
     report: bpy.props.StringProperty()
     packed: bpy.props.StringProperty(subtype="BYTE_STRING")
+    unbent: bpy.props.StringProperty(subtype="BYTE_STRING")  # before it was bent through point pairs
+    pairs: bpy.props.StringProperty()  # as `point_pairs` keeps them
 
 
 def _show_or_hide(_view: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Alignment, Correspondence, report
+from ..solver.carry.inverse import inverse_figures
 from . import earlier_version
 from .fingerprints import fingerprint_of, is_other
 from .mesh_data import Refusal, Surface
@@ -37,6 +38,60 @@ def store(
     surfaces : (Surface, Surface)
         Source and target as they were aligned.
     """
+    kept = target.data.mobius_alignment
+    kept.property_unset("source")  # of an earlier version
+    kept.source_name, kept.source_size = source.name, len(surfaces[0].mesh.vertices)
+    kept.source_fingerprint, kept.target_fingerprint = (surface.rest.fingerprint for surface in surfaces)
+    kept.value = alignment.value
+    kept.upper_bound = alignment.search.upper_bound
+    kept.certified = alignment.certified
+    kept.reflected = alignment.mobius.reflected
+    about = report(alignment, correspondence)
+    kept.coverage = about["coverage"]
+    kept.seconds = sum(alignment.seconds.values())
+    kept.report = json.dumps(about)
+    kept.packed = _packed(correspondence)
+    kept.property_unset("unbent")
+    kept.property_unset("pairs")
+
+
+def store_inverse(
+    source: bpy.types.Object, target: bpy.types.Object, back: Correspondence, surfaces: tuple[Surface, Surface]
+) -> None:
+    """Keep the inverse of what the target's mesh keeps on the source's mesh, with what was proved of it.
+
+    `back` is that map, `surfaces` are source and target.
+    """
+    there, kept = target.data.mobius_alignment, source.data.mobius_alignment
+    areas = surfaces[0].mesh.vertex_areas
+    coverage = float(areas[back.matched].sum() / areas.sum())
+    kept.property_unset("source")
+    kept.source_name, kept.source_size = target.name, len(surfaces[1].mesh.vertices)
+    kept.source_fingerprint, kept.target_fingerprint = there.target_fingerprint, there.source_fingerprint
+    for name in ("value", "upper_bound", "certified", "reflected", "seconds"):
+        setattr(kept, name, getattr(there, name))
+    kept.coverage = coverage
+    figures = _parsed(there.report)
+    if figures is not None:
+        kept.report = json.dumps(inverse_figures(figures, coverage, float(areas @ back.confidence / areas.sum())))
+    kept.packed = _packed(back)
+    kept.property_unset("unbent")
+    kept.property_unset("pairs")
+
+
+def keep_bent(target: bpy.types.Object, correspondence: Correspondence, pairs: str | None) -> None:
+    """Keep a map that was bent through point pairs, beside that from before; None: it is that from before again."""
+    kept = target.data.mobius_alignment
+    if pairs is None:
+        kept.packed = kept.unbent or kept.packed
+        kept.property_unset("unbent")
+        kept.property_unset("pairs")
+        return
+    kept.unbent = kept.unbent or kept.packed
+    kept.packed, kept.pairs = _packed(correspondence), pairs
+
+
+def _packed(correspondence: Correspondence) -> bytes:
     packed = io.BytesIO()
     np.savez(
         packed,
@@ -50,19 +105,7 @@ def store(
             if (found := getattr(correspondence, name)) is not None
         },
     )
-    kept = target.data.mobius_alignment
-    kept.property_unset("source")  # of an earlier version
-    kept.source_name, kept.source_size = source.name, len(surfaces[0].mesh.vertices)
-    kept.source_fingerprint, kept.target_fingerprint = (surface.rest.fingerprint for surface in surfaces)
-    kept.value = alignment.value
-    kept.upper_bound = alignment.search.upper_bound
-    kept.certified = alignment.certified
-    kept.reflected = alignment.mobius.reflected
-    about = report(alignment, correspondence)
-    kept.coverage = about["coverage"]
-    kept.seconds = sum(alignment.seconds.values())
-    kept.report = json.dumps(about)
-    kept.packed = packed.getvalue()
+    return packed.getvalue()
 
 
 def exists(target: bpy.types.Object, source: bpy.types.Object) -> bool:
@@ -122,8 +165,12 @@ def edited(name: str) -> str:
     return rpt_("'{}' has been edited since it was aligned: press Align again").format(name)
 
 
-def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Surface, Surface]) -> Correspondence:
+def load(
+    target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Surface, Surface], *, unbent: bool = False
+) -> Correspondence:
     """Return the correspondence that the target's mesh keeps; `surfaces` are source and target as they are now.
+
+    `unbent`: as it was before it was bent through point pairs.
 
     Raises
     ------
@@ -139,7 +186,7 @@ def load(target: bpy.types.Object, source: bpy.types.Object, surfaces: tuple[Sur
     ):
         if surface.rest.fingerprint != fingerprint and earlier_version.fingerprint(surface.rest) != fingerprint:
             raise Refusal(edited(obj.name))
-    arrays = _unpack(kept.packed, target.name)
+    arrays = _unpack((unbent and kept.unbent) or kept.packed, target.name)
     return Correspondence(
         face=arrays["face"].astype(np.intp),
         barycentric=arrays["barycentric"],

@@ -85,8 +85,10 @@ def build_scans() -> Scans:
     """Build both scans as meshes without any object."""
     head = subdivided(closed_head(), SUBDIVISIONS)
     source = cut_open(head, SOURCE_OPENING, "Source scan")
-    target = cut_open(remeshed(head, VOXEL, TARGET_VERTICES), TARGET_OPENING, "Target scan")
-    bpy.data.meshes.remove(head)
+    other = remeshed(head, VOXEL, TARGET_VERTICES)
+    target = cut_open(other, TARGET_OPENING, "Target scan")
+    for mesh in (head, other):
+        bpy.data.meshes.remove(mesh)
     truth = lay_onto(target, source)
     write_vertices(target, POSE(deform(truth.positions(read_vertices(source)))))
     return Scans(source, target, truth)

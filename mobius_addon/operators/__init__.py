@@ -11,9 +11,11 @@ from . import (
     clear,
     conformal_transfer,
     discs,
+    example,
     flatten,
     heat_map,
     live,
+    point_pairs,
     select_unmatched,
     side_by_side,
     swap,
@@ -24,6 +26,9 @@ from . import (
 
 _register, _unregister = register_factory(
     (
+        example.MOBIUS_OT_load_example,
+        example.MOBIUS_OT_remove_example,
+        example.MOBIUS_OT_guide,
         check.MOBIUS_OT_check,
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
@@ -33,6 +38,10 @@ _register, _unregister = register_factory(
         transfer.MOBIUS_OT_transfer,
         wrap.MOBIUS_OT_wrap,
         live.MOBIUS_OT_live,
+        point_pairs.MOBIUS_OT_add_pair,
+        point_pairs.MOBIUS_OT_bend_through_pairs,
+        point_pairs.MOBIUS_OT_remove_pair,
+        point_pairs.MOBIUS_OT_select_pair,
         select_unmatched.MOBIUS_OT_select_unmatched,
         conformal_transfer.MOBIUS_OT_conformal_transfer,
         heat_map.MOBIUS_OT_heat_map,

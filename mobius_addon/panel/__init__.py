@@ -7,6 +7,7 @@ from .fitted import MOBIUS_PT_fitted
 from .last_transfer import MOBIUS_PT_last_transfer
 from .live import MOBIUS_PT_live
 from .main import MOBIUS_PT_main
+from .pairs import MOBIUS_PT_pairs
 from .parts import MOBIUS_PT_parts
 from .proof import MOBIUS_PT_notes, MOBIUS_PT_proof
 from .result import MOBIUS_PT_result
@@ -27,6 +28,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
         MOBIUS_PT_result,
         MOBIUS_PT_proof,
         MOBIUS_PT_notes,
+        MOBIUS_PT_pairs,
         MOBIUS_PT_parts,
         MOBIUS_PT_pictures,
         MOBIUS_PT_transfer,

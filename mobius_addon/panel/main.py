@@ -15,6 +15,7 @@ from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
 from ..usable import why_not
+from .help import draw_help
 from .place import MobiusPanel, draw_sentence, hand_on
 
 
@@ -43,6 +44,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             if len(selected_targets(context)) > 1:
                 several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
                 hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
+        draw_help(layout, context)
 
 
 def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: str) -> None:

@@ -13,6 +13,7 @@ from zips import ROOT, build_module, run_build
 
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 PLATFORMS = MANIFEST["platforms"]
+GUIDE = {"docs/guide.html", "docs/panel.png", "docs/guide-pairs.png"}
 
 
 def wheels_in(path: Path) -> set[str]:
@@ -33,8 +34,8 @@ def sources() -> set[str]:
 def test_the_zip_holds_the_extension_and_nothing_else(built: Path) -> None:
     with zipfile.ZipFile(built) as archive:
         names = [name for name in archive.namelist() if not name.endswith(".whl")]
-    assert sorted(names) == sorted(sources() | {"__init__.py", "LICENSE", "blender_manifest.toml"})
-    assert {Path(name).suffix for name in names} == {".py", ".c", ".toml", ""}
+    assert sorted(names) == sorted(sources() | {"__init__.py", "LICENSE", "blender_manifest.toml"} | GUIDE)
+    assert {Path(name).suffix for name in names} == {".py", ".c", ".toml", ".html", ".png", ""}
 
 
 def test_what_the_zip_imports_is_in_it(built: Path) -> None:

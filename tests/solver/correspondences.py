@@ -27,7 +27,7 @@ def on_itself(mesh: TriangleMesh, seed: int) -> Correspondence:
     """Each vertex at itself, located in any of the triangles around it: nothing prefers one side of a seam."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(mesh.faces.size)
-    face = np.empty(len(mesh.vertices), int)
+    face = np.zeros(len(mesh.vertices), int)
     face[mesh.faces.ravel()[order]] = order // 3
     barycentric = (mesh.faces[face] == np.arange(len(mesh.vertices))[:, None]).astype(float)
     everywhere = np.ones(len(face), bool)

@@ -145,9 +145,12 @@ def panel_rows() -> list[tuple[int, int]]:
 
 
 def set_factor(places: list[tuple[int, int]], factor: float) -> Wait:
-    """Set the field Factor, the only one that is neither 0 nor the smallest weight."""
+    """Set the field Factor, the only one that is neither 0 nor the smallest weight.
+
+    Looked for again where a slow machine has not answered in time.
+    """
     manager = bpy.context.window_manager
-    for x, y in places:
+    for x, y in 3 * places:
         manager.clipboard = ""
         pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", "ctrl+c")
         yield 0.15
