@@ -14,7 +14,7 @@ from ..solver.carry.frames import nearest_orthogonal
 from ..solver.surface.mesh import Floats
 from .attributes.expression_names import understood
 from .demo.pictures import CLAY, cover, fit, fresh_tree, light, put, render, studio, write
-from .mesh_data import Refusal, Surface, foreach, is_mirrored, mirrored, rest_positions
+from .mesh_data import Refusal, Surface, foreach, mirrored, rest_positions
 
 _TELLING = ("eyeBlink", "jawOpen", "mouthSmile", "mouthPucker", "mouthClose", "browInnerUp")
 """Expressions that are shown first: what goes wrong is seen in them."""
@@ -65,7 +65,7 @@ def render_sheet(
             shapes = [rest] + [rest + mirrored(obj, key_displacement(obj, names[row])) for names in chosen]
             for column, shape in enumerate(shapes):
                 corner = np.array([left + _WIDTH * column, top - _HEIGHT * (row + 1)])
-                frame = np.stack([corner + 0.05, corner + np.array([_WIDTH - 0.05, _HEIGHT - 0.05])])
+                frame = np.array([corner + 0.05, corner + np.array([_WIDTH, _HEIGHT]) - 0.05], dtype=np.float64)
                 mesh = bpy.data.meshes.new("Studio")
                 mesh.from_pydata(rest.tolist(), [], surface.rest.faces.tolist())
                 place = fit(mesh, turn, frame)  # of the shape at rest, so that what stays is seen to stay
@@ -95,16 +95,15 @@ def key_displacement(obj: bpy.types.Object, name: str) -> Floats:
     apart = foreach(key.points, "co", 3, np.float32).astype(np.float64)
     if key.relative_key == obj.data.shape_keys.reference_key:
         return apart - rest_positions(obj.data)
-    return apart - foreach(key.relative_key.points, "co", 3, np.float32)
+    return apart - foreach(key.relative_key.points, "co", 3, np.float32).astype(np.float64)
 
 
 def _turns(
     source: bpy.types.Object, surfaces: tuple[Surface, Surface], correspondence: Correspondence
 ) -> tuple[Rotation, Rotation]:
     """Return how to hold both: the source as it is in the scene, the target as the source."""
-    flip = np.diag([-1.0 if is_mirrored(source) else 1.0, 1.0, 1.0])
-    world = np.array(source.matrix_world, dtype=np.float64)[:3, :3]
-    own = nearest_orthogonal((world @ flip).astype(np.float64)[None])[0]
+    axes: Floats = mirrored(source, np.array(source.matrix_world, dtype=np.float64)[:3, :3])
+    own = nearest_orthogonal(axes[None])[0]
     known = correspondence.face >= 0
     here = (correspondence.matrix() @ surfaces[0].rest.vertices)[known]
     there = surfaces[1].rest.vertices[known]
