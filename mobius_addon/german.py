@@ -130,6 +130,8 @@ GERMAN = {
     "Invert": "Invertieren",
     "It stays, and the carried layer gets a number, as in 'UVMap.001'. What a mesh has once, as materials and seams, is replaced": "Sie bleibt, und die übertragene bekommt eine Nummer, wie in „UVMap.001“. Was ein Mesh nur einmal hat, etwa Materialien und Nähte, wird ersetzt",
     "Keep Both": "Beide behalten",
+    "Carry the Rig": "Rig mit übertragen",
+    "Give the target a copy of the armature that moves the source, its joints where they belong in the target, as modifier and parent as the source has it": "Dem Ziel eine Kopie der Armatur geben, die die Quelle bewegt, die Gelenke dort, wo sie im Ziel hingehören, als Modifikator und Eltern-Objekt wie bei der Quelle",
     "Keep Contacts": "Kontakte erhalten",
     "Keep the strongest so many of the carried vertex groups at each vertex; 0: all": "An jedem Punkt nur so viele der stärksten übertragenen Punktgruppen behalten; 0: alle",
     "Landmarks": "Landmarken",

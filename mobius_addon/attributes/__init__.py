@@ -25,6 +25,7 @@ from .plan import Carried, Transfer, restored_on_failure, write_transfers
 from .preview import Preview, preview
 from .reading import Reading, plan_transfer, read_transfer
 from .record import forget_written
+from .rig import armature_of
 from .settings import Mask, TransferSettings, split_names
 from .table import KINDS, ROWS, Kind, Row
 from .unmatched import Unmatched, carrier_between, unmatched_vertices
@@ -60,6 +61,7 @@ __all__ = [
     "TransferSettings",
     "Unmatched",
     "VertexGroupAccess",
+    "armature_of",
     "carrier_between",
     "forget_written",
     "mask_names",

@@ -15,6 +15,7 @@ from ..textures.writing import made_or_removed, write_textures
 from .carrier import Values
 from .key_set import KeyPlan
 from .record import remember, unedited
+from .rig import Rig, write_rig
 from .table import KINDS, Row
 from .unmatched import Unmatched
 from .vertex_groups import keep_order
@@ -53,6 +54,8 @@ class Transfer:
         The part of the target that corresponds to nothing, and what is done about it.
     textures : Textures or None
         Pictures, if any are carried.
+    rig : Rig or None
+        The armature, if it is carried.
     """
 
     layers: tuple[Carried, ...]
@@ -62,6 +65,7 @@ class Transfer:
     warnings: tuple[str, ...]
     unmatched: Unmatched
     textures: Textures | None = None
+    rig: Rig | None = None
 
     def write(self, obj: bpy.types.Object) -> None:
         """Write every layer on the target; if that fails, the target is as it was."""
@@ -107,6 +111,8 @@ def _write(obj: bpy.types.Object, transfer: Transfer, made: list[Any]) -> None:
         source_map = transfer.textures.layout.source_name
         written = {x.source_name: x.name for x in transfer.layers if x.row.kind == "uv"}
         write_textures(obj, transfer.textures, made, written.get(source_map) if source_map else None)
+    if transfer.rig is not None:
+        write_rig(obj, transfer.rig)
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from .mixing import changes, mixed, over
 from .placing import Place, holds_nothing, is_same, joins, kept_notes, replaced_notes
 from .plan import Carried, Transfer
 from .record import Written, unedited
+from .rig import RigReading, read_rig
 from .settings import TransferSettings
 from .shape_keys import ShapeKeyAccess, limited
 from .table import KINDS, RIDING, ROWS, Row
@@ -62,6 +63,7 @@ class Reading:
     names: tuple[str, str]
     unmatched: Unmatched
     textures: TextureReading | None = None
+    rig: RigReading | None = None
 
     def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
         """Carry every layer.
@@ -106,7 +108,8 @@ class Reading:
             )
         shown_uv, shown_color, others = self.looks.shown(settled, self.names)
         warnings += [*notes, *more, *others, *self.unmatched.warnings(self.names[1])]
-        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched, textures)
+        rig = None if self.rig is None else self.rig.carry()
+        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched, textures, rig)
 
     def _telling(
         self, progress: Callable[[Progress], bool | None] | None, begun: float
@@ -267,6 +270,10 @@ def read_transfer(
         textures = read_textures(
             source, target, carrier, settings.textures, shown=shown_source, keeps_map=keeps_texture_map
         )
+    rig = None
+    if settings.rig:
+        rig, notes = read_rig(source, target, keys_carrier or carrier)
+        warnings += notes
     if not pending and textures is None:
         raise Refusal(_nothing(source.name, settings, warnings))
     if users_of(target.data) > 1:
@@ -288,6 +295,7 @@ def read_transfer(
         (source.name, target.name),
         unmatched or Unmatched.of(carrier),
         textures,
+        rig,
     )
 
 

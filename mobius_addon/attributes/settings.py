@@ -67,6 +67,8 @@ class TransferSettings:
         How shape keys get the target's directions and proportions, see `Carrier.keys_by`.
     contacts : bool
         Bring together what shape keys bring together on the source, see `Carrier.contacts`.
+    rig : bool
+        Carry the armature that moves the source too, fitted to the target; see `rig.RigReading`.
     spelling : str
         How carried expressions are called, see `expression_names.Spelling`.
     evaluated : bool
@@ -98,6 +100,7 @@ class TransferSettings:
     unmatched: Outcome = "carry"
     keys_by: Literal["gradients", "frames"] = "gradients"
     contacts: bool = True
+    rig: bool = False
     spelling: Spelling = "keep"
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"

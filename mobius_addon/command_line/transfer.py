@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..streams import DONE, NOT_ALIGNED, say, say_error
+from ..streams import DONE, NOT_ALIGNED, quiet, say, say_error
 from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
 from .pair import matched_pair, opened_pair, read_pair, require_something_to_write
@@ -31,6 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "mesh file to write; a .blend holds all that the target's .blend does; for several targets a folder",
     )
     parser.add_argument("--use-map", metavar="MAP.npz", type=Path, help="carry through this map instead of aligning")
+    parser.add_argument(
+        "--sheet",
+        metavar="PICTURE.png",
+        type=Path,
+        help="draw source and target below each other with six of the shape keys",
+    )
     add_transfer_options(parser.add_argument_group("transfer"))
     add_texture_options(parser.add_argument_group("textures"))
 
@@ -63,29 +69,42 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from ...solver import report, save_map
+    from ..demo.pictures import require_cycles
     from ..files import Unreadable, outputs, write_mesh
     from ..files.pictures_beside import write_map, write_pictures
     from ..last_transfer import describe_counts
     from ..operators.transfer import read_through
+    from ..sheet import render_sheet
 
     choices = transfer_settings(options)
     settings = align_settings(options)
     require_something_to_write(options)
     if options.texture_map and "textures" not in choices.kinds:
         raise Unreadable("--texture-map is made with textures: say --only textures")
+    if options.sheet and "shape-keys" not in choices.kinds:
+        raise Unreadable("--sheet shows shape keys: carry them too")
     _require_writable(options)
+    if options.sheet:
+        if options.sheet.suffix.lower() != ".png":
+            raise Unreadable(f"'{options.sheet}': a sheet is a .png")
+        require_cycles()
     if options.use_texture_map:
         _through_texture_map(options, choices)
         return
-    with opened_pair(options, write=True) as (source, target, notes):
-        surfaces = read_pair(options, source, target)
-        alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
-        keeps = options.texture_map is not None
-        reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
-        plan = reading.carry()
-        plan.write(target.obj)
-        order = orders(options.map, (source, target))
     with outputs() as written:
+        with opened_pair(options, write=True) as (source, target, notes):
+            surfaces = read_pair(options, source, target)
+            alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
+            keeps = options.texture_map is not None
+            reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
+            plan = reading.carry()
+            plan.write(target.obj)
+            if options.sheet:
+                keys = [(x.source_name, x.name) for x in plan.layers if x.row.kind == "shape-keys"]
+                sheet = written.path(options.sheet)
+                with quiet():
+                    render_sheet((source.obj, target.obj), surfaces, correspondence, keys, sheet)
+            order = orders(options.map, (source, target))
         backup = is_input(options.output, [options.source, options.target])
         if options.texture_map:
             write_map(plan.textures, options.texture_map, written)
@@ -136,7 +155,7 @@ def _require_writable(options: argparse.Namespace) -> None:
 
     inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
     beside = turns_beside(options.texture_map) if options.texture_map else None
-    others = [options.map, options.report, options.texture_map, beside]
+    others = [options.map, options.report, options.texture_map, beside, options.sheet]
     require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
 
 

@@ -60,6 +60,11 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         help="leave open what shape keys close on the source, as lids and lips, where the carried shape does not",
     )
     group.add_argument(
+        "--rig",
+        action="store_true",
+        help="a copy of the armature that moves the source too, its joints where they belong in the target",
+    )
+    group.add_argument(
         "--rename",
         dest="spelling",
         choices=("keep", "arkit", "underscore", "dot"),
@@ -113,7 +118,7 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
     from ..textures.settings import TextureSettings
 
     given = {"kinds": tuple(_kinds(options.only)), "evaluated": options.evaluated, "normalize": options.normalize}
-    given |= {"deform_only": options.deform_only}
+    given |= {"deform_only": options.deform_only, "rig": options.rig}
     if options.names is not None:
         given |= {"layers": "named", "names": split_names(options.names)}
     elif options.active:

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from ...solver.surface.mesh import Floats
 from ..attributes.access import BUILT_IN, SHARPNESS
+from ..attributes.rig import armature_of
 from ..mesh_data import foreach
 from .pictures import pictures_of
 
@@ -34,7 +35,7 @@ _KINDS = {
     "attributes": 1e-3,
 }
 
-_RENAMED = frozenset({"materials", "pictures", "actions"})
+_RENAMED = frozenset({"materials", "pictures", "actions", "armature modifiers"})
 """Things whose names files change: they are counted."""
 
 _PROPERTIES = {
@@ -83,7 +84,7 @@ class Contents:
 
 def contents_of(obj: bpy.types.Object) -> Contents:
     """Return what a mesh object, not in Edit Mode, has."""
-    mesh = obj.data
+    mesh, armature = obj.data, armature_of(obj)
     places = _places(obj)
     corner_vertex = foreach(mesh.loops, "vertex_index", 1, np.int32)
     polygon_size = foreach(mesh.polygons, "loop_total", 1, np.int32)
@@ -104,7 +105,9 @@ def contents_of(obj: bpy.types.Object) -> Contents:
         {
             "materials": [slot.material.name for slot in obj.material_slots if slot.material is not None],
             "pictures": [image.name for image in pictures_of(obj) if min(image.size) > 0],
-            "modifiers": [modifier.name for modifier in obj.modifiers],
+            "modifiers": [modifier.name for modifier in obj.modifiers if modifier.type != "ARMATURE"],
+            "armature modifiers": [modifier.name for modifier in obj.modifiers if modifier.type == "ARMATURE"],
+            "bones": [bone.name for bone in armature.data.bones] if armature is not None else [],
             "constraints": [constraint.name for constraint in obj.constraints],
             "parents": [obj.parent.name] if obj.parent else [],
             "custom properties": [*_custom(obj), *_custom(mesh)],

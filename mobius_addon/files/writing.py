@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ..attributes import forget_written
+from ..attributes import armature_of, forget_written
 from ..mesh_data import Refusal
 from ..streams import quiet
 from .contents import Contents, contents_of, losses
@@ -23,7 +23,8 @@ from .reading import new_scene
 def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: bool = False) -> list[str]:
     """Write a mesh object to what is to become a file, the whole file that is open if that is a .blend.
 
-    Into another format the object goes alone; the file is read again, for which the one that is open is closed.
+    Into another format the object goes alone, with its armature if the format has any; the file is read again, for
+    which the one that is open is closed.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def export_mesh(obj: bpy.types.Object, path: Path, folder: Path | None = None) -
 def _export_alone(obj: bpy.types.Object, path: Path, folder: Path) -> None:
     ending = path.suffix.lower()
     copies = {".fbx": f"{path.stem}.fbm", ".usd": "textures", ".usda": "textures", ".usdc": "textures"}
-    with _alone(obj), tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as stage:
+    rigged = ending in (".glb", ".gltf", ".fbx")
+    with _alone(obj, armature_of(obj) if rigged else None), tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as stage:
         if ending not in (".glb", ".gltf", ".ply", ".stl"):
             separate_pictures(obj, folder / copies.get(ending, "."), Path(stage))
         format_of(path).exporter(str(path))
@@ -96,29 +98,40 @@ def _export_alone(obj: bpy.types.Object, path: Path, folder: Path) -> None:
 
 
 @contextmanager
-def _alone(obj: bpy.types.Object) -> Iterator[None]:
-    """Show an object, wherever it is and whatever hides it, in a scene of its own, selected and active."""
+def _alone(obj: bpy.types.Object, armature: bpy.types.Object | None = None) -> Iterator[None]:
+    """Show an object, wherever it is and whatever hides it, in a scene of its own, selected and active.
+
+    Its armature, if one is given, is there too, in its rest pose.
+    """
     scene, window = bpy.context.scene, bpy.context.window
-    place = obj.matrix_world.copy()
     own = bpy.data.scenes.new(scene.name)
     own.unit_settings.system, own.unit_settings.scale_length = (
         scene.unit_settings.system,
         scene.unit_settings.scale_length,
     )
     own.frame_set(scene.frame_current)
-    own.collection.objects.link(obj)
-    obj.hide_viewport = obj.hide_render = obj.hide_select = False
-    obj.parent = None
-    obj.matrix_world = place
-    for constraint in obj.constraints:
-        constraint.mute = True
+    for one in [obj] if armature is None else [armature, obj]:
+        at = one.matrix_world.copy()
+        own.collection.objects.link(one)
+        one.hide_viewport = one.hide_render = one.hide_select = False
+        if one == armature or one.parent != armature:
+            one.parent = None
+            one.matrix_world = at
+        for constraint in one.constraints:
+            constraint.mute = True
+    if armature is not None:
+        armature.data.pose_position = "REST"
     shown = [modifier for modifier in obj.modifiers if modifier.show_viewport or modifier.show_render]
     for modifier in shown:
+        if armature is not None and modifier.type == "ARMATURE" and modifier.object == armature:
+            continue
         modifier.show_viewport = modifier.show_render = False
     window.scene = own
     try:
         bpy.context.view_layer.update()
         obj.select_set(True)
+        if armature is not None:
+            armature.select_set(True)
         bpy.context.view_layer.objects.active = obj
         yield
     finally:
@@ -141,7 +154,9 @@ def _read_again(path: Path, before: Contents) -> Contents:
     except (RuntimeError, OSError) as error:
         raise Refusal(f"'{path.name}' was not written whole: {first_message(error)}") from error
     bpy.context.view_layer.update()
-    found = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+    # importers draw bones as a mesh
+    drawn = {bone.custom_shape for x in bpy.data.objects if x.type == "ARMATURE" for bone in x.pose.bones}
+    found = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj not in drawn]
     if len(found) != 1:
         raise Refusal(f"'{path.name}' was not written whole: {len(found)} meshes are in it")
     after = contents_of(found[0])

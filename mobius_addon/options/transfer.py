@@ -161,6 +161,12 @@ class TransferOptions(KindSwitches, SourceMaskOptions):
         description="Lids and lips that a shape key closes on the source are closed on the target too",
         default=_TRANSFER.contacts,
     )
+    rig: bpy.props.BoolProperty(
+        name="Carry the Rig",
+        description="Give the target a copy of the armature that moves the source, its joints where they belong in the "
+        "target, as modifier and parent as the source has it",
+        default=_TRANSFER.rig,
+    )
     spelling: bpy.props.EnumProperty(
         name="Rename",
         description="How known expressions are called on the target",
@@ -234,7 +240,7 @@ def transfer_settings(options: Any) -> TransferSettings:
     kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
     receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
     own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
-    own += ("unmatched", "keys_by", "contacts", "spelling", "evaluated")
+    own += ("unmatched", "keys_by", "contacts", "rig", "spelling", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
     textures = TextureSettings(

@@ -33,6 +33,7 @@ def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     column.prop(options, "normalize")
     column.prop(options, "limit")
     column.prop(options, "smallest_weight")
+    column.prop(options, "rig")
     column = layout.column(heading="Shape Keys")
     column.prop(options, "keys_by")
     column.prop(options, "contacts")

@@ -25,6 +25,7 @@ PICTURES = {
         *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "shown", "cleared"),
     ),
     "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
+    "pairing": ("point-pairs",),
 }
 """What each script leaves."""
 

@@ -1,0 +1,72 @@
+"""A sheet shows source and target with the same expressions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import make_sheet, positions
+
+bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
+
+from mobius_extension.mobius_addon.command_line.program import main  # noqa: E402
+from mobius_extension.mobius_addon.sheet import chosen_keys  # noqa: E402
+
+OPTIONS = ["--samples", "50", "--targets", "200", "--reflect", "never"]
+KEYS = ("Wobble", "blink_L", "blink_R", "A", "B", "C", "D", "jawOpen")
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Path:
+    """A source with keys, of which each moves more than the one before, and a turned target."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    source, target = make_sheet("Source", 17), make_sheet("Target", 15)
+    source.shape_key_add(name="Basis")
+    for number, name in enumerate(KEYS, 1):
+        key = source.shape_key_add(name=name, from_mix=False)
+        for vertex, place in zip(key.points, positions(source), strict=True):
+            vertex.co.z += 0.05 * number * np.exp(-4 * (place[:2] ** 2).sum())
+    source.rotation_euler = (np.pi / 2, 0, 0)  # the camera looks along y
+    target.rotation_euler, target.location = (1, 2, 3), (5, 0, 0)
+    path = tmp_path / "pair.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_telling_expressions_come_first_then_what_moves_most(pair):
+    source = bpy.data.objects["Source"]
+    chosen = chosen_keys(source, [(name, name + ".001") for name in KEYS])
+    assert [x for x, _ in chosen] == ["blink_L", "A", "B", "C", "D", "jawOpen"]
+    assert all(other == name + ".001" for name, other in chosen)
+
+
+def test_the_sheet_is_drawn_with_both_in_one_pose_and_nothing_of_it_is_left(pair, tmp_path):
+    picture, out = tmp_path / "sheet.png", tmp_path / "out.blend"
+    given = [f"{pair}:Source", f"{pair}:Target", "-o", str(out), "--sheet", str(picture), *OPTIONS]
+    assert main(["transfer", *given]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    assert [scene.name for scene in bpy.data.scenes] == ["Scene"]
+    assert len(bpy.data.meshes) == len(bpy.data.objects) == 2
+    assert not bpy.data.materials
+    image = bpy.data.images.load(str(picture))
+    width, height = image.size
+    pixels = np.array(image.pixels[:]).reshape(height, width, 4)[:, :, :3]
+    body = (pixels.max(axis=2) < 0.8)[round(height * 0.3 / 5.5) :]  # above the captions
+    half = len(body) // 2
+    below, above = body[:half], body[-half:]
+    assert above.mean() > 0.1
+    # the same shapes, in the same places
+    assert (below != above).mean() < 0.1 * above.mean()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--sheet", "sheet.jpg"], "a sheet is a .png"),
+        (["--sheet", "sheet.png", "--only", "uv"], "carry them too"),
+    ],
+)
+def test_what_no_sheet_can_show_is_refused(pair, given, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["transfer", f"{pair}:Source", f"{pair}:Target", "-o", "out.blend", *given]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out.blend").exists()
