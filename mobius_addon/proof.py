@@ -18,7 +18,9 @@ def _certificate(found: dict[str, Any]) -> str:
     gap = found["gap"]
     if "rotation" in found and found["rotation"]["upper_bound"] <= found["value"]:
         share = 100 * gap / max(found["value"], 1e-9)
-        return iface_("no rotation matches more, no map with {} over {:.1f} % more").format(found["certified_for"], share)
+        return iface_("no rotation matches more, no map with {} over {:.1f} % more").format(
+            found["certified_for"], share
+        )
     return (iface_("not the best, gap {:.2f}") if found["rival_taken"] else iface_("open, gap {:.2f}")).format(gap)
 
 

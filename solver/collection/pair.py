@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..align.alignment import Alignment
-from ..flatten.sphere import require_open
 from ..align.judgement import Judgement, coverage, judged
+from ..flatten.sphere import require_open
 from ..mobius import Mobius
 from .distance import EvenFlow, continuous_procrustes
 
