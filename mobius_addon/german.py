@@ -501,7 +501,7 @@ GERMAN = {
     "Remove Example": "Beispiel entfernen",
     "Remove the heads of the example, with all that was made of them": "Die Köpfe des Beispiels entfernen, mit allem, was daraus gemacht wurde",
     "There is no example in this scene": "In dieser Szene ist kein Beispiel",
-    "Guide": "Anleitung",
+    "Open Guide": "Anleitung öffnen",
     "Open the guide, a page that comes with the extension, in the web browser": "Die Anleitung, eine Seite der Erweiterung, im Webbrowser öffnen",
     "The guide '{}' is missing: install the extension again": "Die Anleitung „{}“ fehlt: die Erweiterung neu installieren",
     "In the 3D viewport: press N, tab Möbius": "In der 3D-Ansicht: N drücken, Reiter Möbius",

@@ -90,7 +90,7 @@ class MOBIUS_OT_guide(bpy.types.Operator):
     """Open the guide, a page that comes with the extension, in the web browser."""
 
     bl_idname = "mobius.guide"
-    bl_label = "Guide"
+    bl_label = "Open Guide"
     bl_options = {"INTERNAL"}
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
