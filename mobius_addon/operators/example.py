@@ -1,7 +1,6 @@
 """For whoever begins: two heads to try everything on, and the guide."""
 
 # no postponed annotations here: Blender reads the properties from them
-import webbrowser
 from pathlib import Path
 
 import bpy
@@ -98,5 +97,4 @@ class MOBIUS_OT_guide(bpy.types.Operator):
         if not GUIDE.is_file():
             self.report({"ERROR"}, rpt_("The guide '{}' is missing: install the extension again").format(GUIDE))
             return {"CANCELLED"}
-        webbrowser.open(GUIDE.as_uri())
-        return {"FINISHED"}
+        return bpy.ops.wm.url_open(url=GUIDE.as_uri())

@@ -25,10 +25,6 @@ SETTLED = 0.005
 DRAFTS = 4
 """Drafts at most until the overlap is settled."""
 
-SETTLES = 2
-"""Factor by which changes have to fall from one draft to the next. Where they fall by less, more of them are to come
-than came, and each makes much of the coordinates' last digits (20 to 100 times as much, on an ear)."""
-
 
 def drafted_from(found: Alignment, clock: Part, start: Floats | None = None) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
@@ -62,17 +58,13 @@ def bent_densely(
     if max(left_out(source, target, here, there)) > PARTIAL:
         clock.begin("overlap", "Finding the overlap", 0.2)
         still = clock.within(0.2, 0.2)
-        changed = np.inf
         for _ in range(DRAFTS - 1):
             # pose and scale again, from where the surfaces meet
             believed = np.where(there, 1.0, 1e-3)
-            again = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, still)
-            now = shared(again, source, target, still)
-            before, changed = changed, max(left_out(source, target, here == now[0], there == now[1]))
-            if changed > max(before / SETTLES, SETTLED):  # it does not settle
-                break
-            draft, (here, there) = again, now
-            if changed < SETTLED:
+            draft = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, still)
+            before = here, there
+            here, there = shared(draft, source, target, still)
+            if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:
                 break
         if max(left_out(source, target, here, there)) > PARTIAL:
             overlap = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)

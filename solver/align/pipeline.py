@@ -104,7 +104,7 @@ def _with_main_parts(
         found = _of_main_parts(source, target, settings, clock.part(0.0, 0.9), landmarks)
     except MeshError as error:  # as of what is closed
         reason = error
-    if found is not None and (alone or found[0].mean_confidence > DOUBTFUL):
+    if found is not None and (alone or (found[0].mean_confidence > DOUBTFUL and not _fits_any_way(found[0]))):
         return found[0], (source, target), found[1]
     for one, other in () if alone else other_mains(source, target):
         try:
@@ -118,6 +118,11 @@ def _with_main_parts(
         assert reason is not None
         raise reason
     return found[0], (source, target), found[1]
+
+
+def _fits_any_way(found: Alignment) -> bool:
+    """Return whether closed parts fit in several ways, as a ball does, so that they tell nothing of the others."""
+    return found.source.domain.closed and any(said.startswith("ambiguous: ") for said in found.warnings)
 
 
 def _of_main_parts(

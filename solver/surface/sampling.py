@@ -65,7 +65,8 @@ def farthest_points(
     if not chosen:
         outside = np.flatnonzero(~allowed)
         depth = dijkstra(graph, indices=outside, min_only=True) if len(outside) else np.zeros(len(allowed))
-        chosen = [int(np.argmax(np.where(allowed & np.isfinite(depth), depth, -1)))]
+        # from vertices in no face, which is all that a closed surface may leave out, nothing is reached
+        chosen = [int(np.argmax(np.where(allowed, np.where(np.isfinite(depth), depth, 0), -1)))]
     distance = dijkstra(graph, indices=chosen, min_only=True)
     reachable = allowed & np.isfinite(distance)
     while len(chosen) < count:
