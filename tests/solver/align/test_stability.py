@@ -15,10 +15,7 @@ REAL = {
 }
 
 
-DRIFTS = pytest.mark.xfail(reason="the soft drafts that settle an ear's overlap, one from another, make 1e-9 into 2e-3")
-
-
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=DRIFTS if kind == "ears" else ()) for kind in REAL])
+@pytest.mark.parametrize("kind", REAL)
 def test_the_last_digits_decide_nothing(real_mesh, kind):
     source, target = (real_mesh(file) for file in REAL[kind])
     moved = apart(source, target)
