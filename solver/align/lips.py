@@ -18,8 +18,7 @@ def with_lips_joined(source: Surface, target: Surface) -> tuple[Surface, Surface
     first, second = _joined(source, target), _joined(target, source)
     said = tuple(
         f"'{own.original.name}': {plural((_rim(own.cleaned.mesh) - _rim(new.cleaned.mesh)) // 2, 'edge')} that a shape "
-        f"key opens joined, "
-        f"as '{other.original.name}' has no opening, for the computation only"
+        f"key opens joined, as '{other.original.name}' has no opening, for the computation only"
         for own, new, other in ((source, first, target), (target, second, source))
         if new is not own
     )

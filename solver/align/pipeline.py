@@ -122,7 +122,8 @@ def _with_main_parts(
 
 def _fits_any_way(found: Alignment) -> bool:
     """Return whether closed parts fit in several ways, as a ball does, so that they tell nothing of the others."""
-    return found.source.domain.closed and any(said.startswith("ambiguous: ") for said in found.warnings)
+    margin = found.rival_margin
+    return found.source.domain.closed and margin is not None and margin <= found.settings.reflect_margin
 
 
 def _of_main_parts(
