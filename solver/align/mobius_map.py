@@ -11,17 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
+from ..search.both_sides import search_both
 from ..search.branch_and_bound import SearchResult, search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
-from ..search.rival import Rival, best_rival
+from ..search.rival import LOOKED_AT, Rival, best_rival
 from ..search.sphere_rival import best_sphere_rival
 from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
 from ..surface.mesh import Floats, Integers, MeshError, Places
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
-from .objective import compatibility, covering_radius
+from .objective import compatibility
 from .prepared import Surface
 from .refine import refined
 from .settings import AlignSettings
@@ -61,7 +62,7 @@ def searched(
     problem = Objective(
         source.places[source_samples],
         target.places[target_samples],
-        covering_radius(target.places[target_samples])
+        target_surface.target_radii(settings.targets)
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
@@ -89,7 +90,7 @@ def searched(
         other=other,
         source_cleaned=source_surface.cleaned,
         target_cleaned=target_surface.cleaned,
-        warnings=(*warnings, *said, *unproved(found)),
+        warnings=(*warnings, *said),
     )
 
 
@@ -143,6 +144,7 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
         known,
         z_max=found.settings.z_max,
         enough=enough,
+        at_least=LOOKED_AT if _thorough(found.settings) else 0,
         time_limit=found.settings.time_limit,
         threads=found.settings.threads,
         progress=clock.searching(0.15),
@@ -180,6 +182,19 @@ def _both_sides(
     problem: Objective, settings: AlignSettings, clock: Part
 ) -> tuple[SearchResult, SearchResult | None, list[str]]:
     """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""
+    if settings.reflect == "auto" and not _thorough(settings):
+        clock.begin("search", "Searching", 0.4)
+        plain, turned = search_both(
+            problem,
+            z_max=settings.z_max,
+            margin=settings.reflect_margin * len(problem.source),
+            time_limit=settings.time_limit,
+            threads=settings.threads,
+            progress=clock.searching(0.35),
+        )
+        if plain.cancelled:
+            raise Cancelled
+        return _decided(plain, _mirrored(turned), problem, settings)
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
@@ -204,7 +219,18 @@ def _both_sides(
         results[reflected] = _mirrored(result) if reflected else result
     if len(results) == 1:
         return results[sides[0]], None, []
-    advantage = (results[True].value - results[False].value) / len(problem.source)
+    return _decided(results[False], results[True], problem, settings)
+
+
+def _thorough(settings: AlignSettings) -> bool:
+    return settings.thorough or settings.refine == "dense"
+
+
+def _decided(
+    plain: SearchResult, turned: SearchResult, problem: Objective, settings: AlignSettings
+) -> tuple[SearchResult, SearchResult, list[str]]:
+    """Return the orientation to take, the other, and a warning if they are hardly apart."""
+    advantage = (turned.value - plain.value) / len(problem.source)
     chosen = advantage > settings.reflect_margin
     warnings = []
     if abs(advantage) <= settings.reflect_margin:
@@ -212,7 +238,7 @@ def _both_sides(
             f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
             "taken as not mirrored"
         )
-    return results[chosen], results[not chosen], warnings
+    return (turned, plain, warnings) if chosen else (plain, turned, warnings)
 
 
 def _mirrored(result: SearchResult) -> SearchResult:

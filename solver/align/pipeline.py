@@ -70,21 +70,21 @@ def align(
     others = found.whole is not None
     notes = [said for surface in used for said in surface.notes_with(others)]
     notes += found.whole.notes if found.whole else ()
-    found = replace(found, seconds=clock.seconds, warnings=(*notes, *found.warnings))
+    found = found.annotated(seconds=clock.seconds, warnings=(*notes, *found.warnings))
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         known = causes(found, *used)
         likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
         kinds = tuple(cause.kind for cause in known)
-        return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
+        return found.annotated(warnings=(*found.warnings, said, *likely), causes=kinds)
     if found.mean_confidence < FITS and any(said.startswith("partial overlap: ") for said in found.warnings):
         said = (
             "unsure: what the surfaces have in common fits less well than it should, so what is said to be missing may "
             "only be stretched: look along its edge, or mark points there"
         )
-        found = replace(found, warnings=(*found.warnings, said))
+        found = found.annotated(warnings=(*found.warnings, said))
     cause = coarse(found)
-    return found if cause is None else replace(found, warnings=(*found.warnings, cause.text), causes=(cause.kind,))
+    return found if cause is None else found.annotated(warnings=(*found.warnings, cause.text), causes=(cause.kind,))
 
 
 _Both = tuple[Surface, Surface]
@@ -143,7 +143,7 @@ def _of_main_parts(
             found, target = other
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
-    return replace(found, warnings=(*joined, *said, *found.warnings)), (source, target)
+    return found.annotated(warnings=(*joined, *said, *found.warnings)), (source, target)
 
 
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:
@@ -151,7 +151,7 @@ def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock:
     if found.settings.parts == "main" or not (source.largest_part and target.largest_part):
         return found
     clock.begin("parts", "Pairing parts", 0.0)
-    return replace(found, whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
+    return found.annotated(whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
 
 
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:
