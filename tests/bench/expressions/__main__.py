@@ -24,10 +24,12 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "addon"), str(ROOT / "tests" / "solver")]
 
+import bpy  # noqa: E402
 import conftest  # noqa: E402, F401  (loads the extension)
 from mobius_extension.mobius_addon.attributes.expression_names import renamed  # noqa: E402
 
 from solver import AlignSettings, Correspondence, align, correspond, load_map, prepare, save_map  # noqa: E402
+from solver.carry.fitted import is_reflected  # noqa: E402
 from tests.bench.heads.people import Head, read_head  # noqa: E402
 from tests.bench.heads.targets import Target, target_of  # noqa: E402
 from tests.bench.paper.data import DATA, absent  # noqa: E402
@@ -40,9 +42,9 @@ FIGURES = ("whole", "skin", "parts", "like", "gap", "through", "wrong")
 WAYS = ("ours", "without contacts", "frames", "nearest point", "true map")
 
 
-def keys_of(head: Head) -> dict[str, np.ndarray]:
-    """Return a head's displacements by ARKit's names."""
-    found = renamed(head.keys, "arkit")
+def keys_of(head: Head, mirrored: bool = False) -> dict[str, np.ndarray]:
+    """Return a head's displacements by ARKit's names, by those of the other side where the map mirrors."""
+    found = renamed(head.keys, "arkit", bpy.utils.flip_name if mirrored else None)
     return {name: np.sum([head.keys[one] for one in halves], axis=0) for name, halves in found.items()}
 
 
@@ -76,7 +78,8 @@ def one(head: Head, other: Head, kept: float, folder: Path) -> dict[str, dict[st
     related = head.template == other.template
     ways = by_map(found, head.mesh, target.mesh)
     own = keys_of(other)
-    chosen = {name: moved for name, moved in keys_of(head).items() if name in own and np.abs(moved).max() > 0}
+    mirrored = is_reflected(found, head.mesh, target.mesh)
+    chosen = {name: moved for name, moved in keys_of(head, mirrored).items() if name in own and np.abs(moved).max() > 0}
     on = found.face >= 0 if not related else np.ones(len(target.part), bool)
     truth = true_map(head, target) if related else None
     places = ((truth or found).matrix() @ head.vertices)[on]
@@ -102,7 +105,7 @@ def one(head: Head, other: Head, kept: float, folder: Path) -> dict[str, dict[st
     print(
         f"{head.name} > {other.name}, {kept:.0%}, {len(target.mesh.faces):,} faces: {len(rows)} keys, confidence "
         f"{known['confidence']:.2f}, {known['parts'][0] if known['parts'] else 1} parts paired, aligned in "
-        f"{known['seconds']:.0f} s, carried in {seconds:.1f} s of the processor",
+        f"{known['seconds']:.0f} s, carried in {seconds:.1f} s of the processor{', mirrored' * mirrored}",
         flush=True,
     )
     return rows
