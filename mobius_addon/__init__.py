@@ -18,6 +18,7 @@ _TOOLS = (
     "earlier_version",
     "deleted",
     "jobs",
+    "playing",
     "operators",
     "shown_result",
     "preset_menus",
