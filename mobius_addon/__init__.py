@@ -20,6 +20,7 @@ _TOOLS = (
     "jobs",
     "operators",
     "shown_result",
+    "saving",
     "preset_menus",
     "panel",
     "translation",
