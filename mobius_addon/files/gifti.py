@@ -1,6 +1,6 @@
 """Surfaces of brains in .gii files (GIFTI), by nibabel, which the command line's environment has.
 
-What a file says of its surface (which half of the brain it is, in which space) is kept with the mesh, and written again.
+What a file says of its surface, which half of the brain it is and in which space, is kept with the mesh and written.
 """
 
 from __future__ import annotations
@@ -55,7 +55,11 @@ def read(path: str) -> None:
     corners = faces.astype(np.intp).ravel()
     mesh = put_into_scene(Polygons(vertices.astype(np.float64), corners, np.full(len(faces), 3)), Path(path))
     space = points[0].coordsys
-    said = {"file": dict(image.meta), "points": dict(points[0].meta), "triangles": dict(triangles[0].meta)}
+    said: dict[str, Any] = {
+        "file": dict(image.meta),
+        "points": dict(points[0].meta),
+        "triangles": dict(triangles[0].meta),
+    }
     if space is not None:
         said["space"] = [space.dataspace, space.xformspace, np.asarray(space.xform, float).tolist()]
     mesh[PROPERTY] = json.dumps(said)
@@ -67,18 +71,11 @@ def write(path: str) -> None:
     obj = bpy.context.view_layer.objects.active
     vertices, faces = _triangles(obj)
     said = said_of(obj.data)
+    about = {name: gifti.GiftiMetaData(said.get(name, {})) for name in ("file", "points", "triangles")}
     space = gifti.GiftiCoordSystem(*said["space"]) if "space" in said else gifti.GiftiCoordSystem()
-    gifti.GiftiImage(
-        meta=gifti.GiftiMetaData(said.get("file", {})),
-        darrays=[
-            gifti.GiftiDataArray(
-                vertices.astype(np.float32), "pointset", coordsys=space, meta=gifti.GiftiMetaData(said.get("points", {}))
-            ),
-            gifti.GiftiDataArray(
-                faces.astype(np.int32), "triangle", meta=gifti.GiftiMetaData(said.get("triangles", {}))
-            ),
-        ],
-    ).to_filename(path)
+    points = gifti.GiftiDataArray(vertices.astype(np.float32), "pointset", coordsys=space, meta=about["points"])
+    triangles = gifti.GiftiDataArray(faces.astype(np.int32), "triangle", meta=about["triangles"])
+    gifti.GiftiImage(meta=about["file"], darrays=[points, triangles]).to_filename(path)
 
 
 def said_of(mesh: bpy.types.Mesh) -> dict[str, Any]:

@@ -45,7 +45,9 @@ def read_values(path: Path, vertices: int, of: str) -> Any:
         raise Unreadable(f"'{path}' could not be read: {error or type(error).__name__}") from error
     names = {array.intent: _name(array.intent) for array in image.darrays}
     if _SPARSE in names.values():
-        raise Unreadable(f"'{path}' lists values of some vertices only, by number: write it with a value for each first")
+        raise Unreadable(
+            f"'{path}' lists values of some vertices only, by number: write it with a value for each first"
+        )
     kept = [array for array in image.darrays if names[array.intent] not in _SURFACE]
     if not kept:
         raise Unreadable(f"'{path}' holds no values")
