@@ -471,6 +471,7 @@ GERMAN = {
     "Looking where to cut": "Suchen, wo geschnitten wird",
     "Trying a piece": "Ein Stück versuchen",
     "Trying the next best map": "Die nächstbeste Abbildung versuchen",
+    "Trying the other end": "Das andere Ende versuchen",
     "Trying the other side": "Die andere Seite versuchen",
     "Correct by Point Pairs": "Durch Punktpaare korrigieren",
     "Add Point Pair": "Punktpaar hinzufügen",

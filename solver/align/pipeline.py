@@ -14,12 +14,13 @@ from .completing import completed
 from .confidence import BOUND
 from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
-from .diagnosis import causes, coarse
+from .diagnosis import causes, coarse, deep
 from .inside_out import turned_round
 from .landmarks import own_landmarks
 from .lips import with_lips_joined
 from .main_parts import other_mains
 from .mobius_map import roughly_aligned
+from .other_rim import with_other_rim
 from .prepared import Surface
 from .reconsider import DOUBTFUL, FITS, reconsidered
 from .remark import Remark
@@ -89,8 +90,9 @@ def _with_doubts(found: Alignment, used: _Both) -> Alignment:
             "only be stretched: look along its edge, or mark points there"
         )
         found = replace(found, remarks=(*found.remarks, Remark("unsure", said)))
-    cause = coarse(found)
-    return found if cause is None else replace(found, remarks=(*found.remarks, cause), causes=(cause.kind,))
+    known = [coarse(found), *(map(deep, used) if found.mean_confidence < FITS else ())]
+    told = tuple(cause for cause in known if cause is not None)
+    return replace(found, remarks=(*found.remarks, *told), causes=tuple(cause.kind for cause in told))
 
 
 _Both = tuple[Surface, Surface]
@@ -144,9 +146,12 @@ def _of_main_parts(
         part = clock.part(0.45, 0.95)
         first = drafted_from(matched, part)
         found = bent_densely(matched, first, part, pairs)
-        other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
+        other = turned_round(found, source, target, clock.part(0.95, 0.96), pairs)
+        rim = None if other else with_other_rim(found, source, target, clock.part(0.96, 0.97), pairs)
         if other is not None:
             found, target = other
+        elif rim is not None:
+            found, source, target = rim
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
     return replace(found, remarks=(*joined, *said, *found.remarks)), (source, target)

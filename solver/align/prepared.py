@@ -115,7 +115,7 @@ class Surface:
         if found.rim_lost > LOST:
             raise MeshError(
                 f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
-                "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
+                "its rim would fall together in points: cut it into pieces that are at most eight times as long as wide"
             )
         tidy = self.cleaned.mesh
         return found if found.mesh is tidy else replace(found, exact=tidy.vertices)
