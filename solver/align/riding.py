@@ -14,6 +14,10 @@ from .space import Similarities
 STIFF = 0.1
 """Extent, in diagonals, below which a part that rides along does so as one piece: buttons and teeth are not bent."""
 
+ROUND = 0.2, 0.2
+"""Extent up to which what is round does so too, and least ratio of its second moments for that: an eyeball is 0.12 to
+0.15 of a head, and half of a ball's shell has a quarter."""
+
 
 @dataclass(frozen=True, eq=False)
 class Known:
@@ -85,7 +89,7 @@ def ride(known: Known, source: Parts, target: Parts) -> Riding | None:
         if not len(vertices):
             continue
         here = target.mesh.vertices[vertices]
-        if float(np.linalg.norm(np.ptp(part.mesh.vertices, axis=0))) >= STIFF * known.main_size:
+        if not _is_stiff(part.mesh, target.moments[1][number], known.main_size):
             found.append(_beside(known, source, surface, vertices, here))
             continue
         centre = target.moments[0][number]
@@ -110,6 +114,13 @@ def ride(known: Known, source: Parts, target: Parts) -> Riding | None:
         return None
     parts = zip(*((x.vertices, x.face, x.barycentric, x.leader) for x in found), strict=True)
     return Riding(*(np.concatenate(several) for several in parts))
+
+
+def _is_stiff(mesh: TriangleMesh, about: Floats, main_size: float) -> bool:
+    """Return whether a part rides as one piece; `about` is its covariance, (3, 3)."""
+    extent = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))) / main_size
+    least, _, most = np.linalg.eigvalsh(about)
+    return extent < STIFF or (extent < ROUND[0] and least > ROUND[1] * most)
 
 
 def _beside(known: Known, source: Parts, surface: SurfacePoints, vertices: Integers, here: Floats) -> Riding:
