@@ -21,6 +21,7 @@ _TOOLS = (
     "playing",
     "operators",
     "shown_result",
+    "saving",
     "preset_menus",
     "panel",
     "translation",

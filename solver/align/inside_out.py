@@ -18,6 +18,7 @@ from .dense import bent_densely, drafted_from
 from .mobius_map import challenged, searched
 from .prepared import Surface
 from .reconsider import DOUBTFUL
+from .remark import Remark
 
 MOSTLY = 0.6
 """Mean confidence over the whole target, 0 where it has no counterpart, up to which the other side is tried."""
@@ -55,7 +56,7 @@ def turned_round(
     if _bulge(one) < 0 <= _bulge(two):
         one, two = two, one
     said = f"'{two.mesh.name}' seems to be inside out beside '{one.mesh.name}': turned for the computation only"
-    return replace(other, warnings=(said, *other.warnings)), turned
+    return replace(other, remarks=(Remark("done", said), *other.remarks)), turned
 
 
 def _sure(found: Alignment) -> float:
