@@ -67,12 +67,13 @@ def test_teeth_without_counterparts_go_with_the_row_that_they_are_pieces_of() ->
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_an_eye_within_an_eye_turns_about_its_centre(axis: str) -> None:
     at = (0.35, 0.4, 0.1)
-    eye, inner = ball(at, 0.12), ball(at, 0.1, rings=7)
+    # the lid is nearer to the eye than its shells are to each other
+    eye, inner = ball(at, 0.16), ball(at, 0.1, rings=7)
     got = carried([eye], [eye, inner], [turned(eye, axis, 20, at)])
     for thing, values in zip((eye, inner), got, strict=True):
         wanted = turned(thing, axis, 20, at)
         assert np.linalg.norm(values - wanted) < 0.1 * np.linalg.norm(wanted)
-        assert np.linalg.norm(values.mean(axis=0)) < 0.02 * 0.12
+        assert np.linalg.norm(values.mean(axis=0)) < 0.02 * 0.16
 
 
 def test_layers_of_a_lash_without_counterparts_turn_with_the_one_that_has_one() -> None:
