@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
     from ..files import outputs
 
     settings = align_settings(options)
-    inputs = [options.source, options.target, options.landmarks]
+    inputs = [options.source, options.target, options.landmarks, options.pairs]
     require_writable(others=[options.map, options.report], inputs=inputs)
     with opened_pair(options, write=False) as (source, target, _):
         surfaces = read_pair(options, source, target)
