@@ -29,6 +29,7 @@ GERMAN_SENTENCES = {
     "source": "Quelle",
     "target": "Zielfläche",
     "'{}' seems to be inside out beside '{}': turned for the computation only": "„{}“ scheint neben „{}“ umgestülpt zu sein: nur für die Berechnung umgedreht",
+    "'{}': another opening than the longest taken for its outer boundary, with which it fits better, for the computation only": "„{}“: nur für die Berechnung gilt eine andere Öffnung als die längste als äußerer Rand, womit es besser passt",
     "'{}': {}, for the computation only": "„{}“: {}, nur für die Berechnung",
     # what is refused, and what was put in order
     "'{}' and '{}' have no {} with equal names: add some, or turn landmarks off": "„{}“ und „{}“ haben keine {} mit gleichen Namen: Welche hinzufügen oder Landmarken ausschalten",
@@ -64,7 +65,7 @@ GERMAN_SENTENCES = {
     "'{}' is too coarse for a map to the sphere: {}: subdivide it": "„{}“ ist zu grob für eine Abbildung auf die Kugel: {}: Unterteilen",
     "'{}' is too coarse for the method '{}': {}": "„{}“ ist zu grob für das Verfahren „{}“: {}",
     "'{}' is too deep or too long for a disc: {}, as parts shrink to 1/10^{} of their area there: cut them off, or cut it into pieces that are about as wide as long": "„{}“ ist zu tief oder zu lang für eine Scheibe: {}, da Teile dort auf 1/10^{} ihrer Fläche schrumpfen: Abschneiden, oder in Stücke zerschneiden, die etwa so breit wie lang sind",
-    "'{}' is too long and narrow to be aligned in a disc, where {} of its rim would fall together in points: cut it into pieces that are at most ten times as long as wide": "„{}“ ist zu lang und schmal zum Ausrichten in einer Scheibe, in der {} des Rands in Punkten zusammenfielen: In Stücke zerschneiden, die höchstens zehnmal so lang wie breit sind",
+    "'{}' is too long and narrow to be aligned in a disc, where {} of its rim would fall together in points: cut it into pieces that are at most eight times as long as wide": "„{}“ ist zu lang und schmal zum Ausrichten in einer Scheibe, in der {} des Rands in Punkten zusammenfielen: In Stücke zerschneiden, die höchstens achtmal so lang wie breit sind",
     "'{}' juts out too far for a sphere: {}, as parts shrink to 1/10^{} of their area there: cut off what juts out, as arms and legs": "„{}“ ragt für eine Kugel zu weit heraus: {}, da Teile dort auf 1/10^{} ihrer Fläche schrumpfen: Abschneiden, was herausragt, wie Arme und Beine",
     "'{}' lies so far from the origin that its coordinates have steps of {}, at edges of {}: move it to the origin before it is written in single precision": "„{}“ liegt so weit vom Ursprung, dass Koordinaten Schritte von {} haben, bei Kanten von {}: Zum Ursprung bewegen, bevor es in einfacher Genauigkeit geschrieben wird",
     "'{}' needs integer faces of shape (m, 3), not {} {}": "„{}“ braucht ganzzahlige Flächen der Form (m, 3), nicht {} {}",
