@@ -185,7 +185,7 @@ def _package(name: str, inside: str) -> Path | None:
     """Return a folder of a package that ships surfaces, without importing it; None, and says so, if it is not there."""
     found = importlib.util.find_spec(name)
     if found is None or not found.submodule_search_locations:
-        print(f"skipped: the package '{name}' is not installed: uv sync --group compare")
+        print(f"skipped: the package '{name}' is not installed: uv sync --group anatomy")
         return None
     return Path(found.submodule_search_locations[0]) / inside
 
