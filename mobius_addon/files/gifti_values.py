@@ -98,7 +98,7 @@ def _nearest(values: np.ndarray, carrier: Carrier) -> np.ndarray:
 
 
 def _between(values: np.ndarray, carrier: Carrier) -> np.ndarray:
-    """Return numbers carried linearly; those that are none do not count, and are taken over where they are most."""
+    """Return numbers carried linearly; a place most of which has none gets none."""
     number = np.isfinite(values)
     weight: Floats = carrier.points(number)[0]
     carried, covered = carrier.points(np.where(number, values, 0))

@@ -23,7 +23,7 @@ AMPLITUDE, WAVES = 0.03, 6.0
 """Of the smooth bend, in roots of the surface's area: the middle of a face moves by 1 to 2 % of the diagonal."""
 
 BONES = ("capitate", "hamate", "lunate", "scaphoid", "trapezium", "trapezoid", "triquetrum", "1mc", "2mc", "3mc")
-"""Of a hand: seven of the wrist that are spheres without repair, the long ones of thumb, index and middle finger."""
+"""Of a hand: seven of the wrist, and the long ones of thumb, index and middle finger; spheres without repair."""
 
 TEETH = (("K04", "K05"), ("i14", "i15"), ("H10", "H19"), ("x02", "x17"))
 
@@ -185,7 +185,7 @@ def _package(name: str, inside: str) -> Path | None:
     """Return a folder of a package that ships surfaces, without importing it; None, and says so, if it is not there."""
     found = importlib.util.find_spec(name)
     if found is None or not found.submodule_search_locations:
-        print(f"skipped: the package '{name}' is not installed: uv sync --group compare")
+        print(f"skipped: the package '{name}' is not installed: uv sync --group anatomy")
         return None
     return Path(found.submodule_search_locations[0]) / inside
 
