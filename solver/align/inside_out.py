@@ -16,6 +16,7 @@ from ..surface.mesh import Integers
 from .alignment import Alignment
 from .otherwise import doubted, otherwise
 from .prepared import Surface
+from .remark import Remark
 
 
 def turned_round(
@@ -36,7 +37,7 @@ def turned_round(
     if _bulge(one) < 0 <= _bulge(two):
         one, two = two, one
     said = f"'{two.mesh.name}' seems to be inside out beside '{one.mesh.name}': turned for the computation only"
-    return replace(other, warnings=(said, *other.warnings)), turned
+    return replace(other, remarks=(Remark("done", said), *other.remarks)), turned
 
 
 def _bulge(flattening: Flat) -> float:

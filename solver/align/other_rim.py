@@ -16,6 +16,7 @@ from ..surface.mesh import Floats, Integers
 from .alignment import Alignment
 from .otherwise import doubted, otherwise
 from .prepared import Surface
+from .remark import Remark
 
 ALIKE = 0.5
 """Length of a boundary, in those of the longest one, from which on either may be the outer one. The wrong one is the
@@ -47,7 +48,7 @@ def with_other_rim(
         f"'{changed.original.name}': another opening than the longest taken for its outer boundary, with which it fits "
         "better, for the computation only"
     )
-    return replace(other, warnings=(said, *other.warnings)), source, target
+    return replace(other, remarks=(Remark("done", said), *other.remarks)), source, target
 
 
 def _second(surface: Surface) -> tuple[float, int]:

@@ -23,6 +23,7 @@ from .mobius_map import roughly_aligned
 from .other_rim import with_other_rim
 from .prepared import Surface
 from .reconsider import DOUBTFUL, FITS, reconsidered
+from .remark import Remark
 from .settings import AlignSettings
 
 
@@ -69,25 +70,29 @@ def align(
     found = _with_other_parts(found, source, target, clock.part(0.98, 1))
     clock.end()
     others = found.whole is not None
-    notes = [said for surface in used for said in surface.notes_with(others)]
-    notes += found.whole.notes if found.whole else ()
-    found = replace(found, seconds=clock.seconds, warnings=(*notes, *found.warnings))
+    first = [one for surface in used for one in surface.remarks(other_parts=others)]
+    first += found.whole.remarks if found.whole else ()
+    found = replace(found, seconds=clock.seconds, remarks=(*first, *found.remarks))
+    return _with_doubts(found, used)
+
+
+def _with_doubts(found: Alignment, used: _Both) -> Alignment:
+    """Return the alignment with what is to be doubted about it, and why; `used`: the surfaces that were aligned."""
     if found.mean_confidence <= DOUBTFUL:
         said = f"doubtful: more likely than not the map errs by more than {100 * BOUND:.0f} % of the source's diagonal"
         known = causes(found, *used)
-        likely = tuple(f"doubtful, perhaps because {cause.text}" for cause in known)
-        kinds = tuple(cause.kind for cause in known)
-        return replace(found, warnings=(*found.warnings, said, *likely), causes=kinds)
-    if found.mean_confidence < FITS and any(said.startswith("partial overlap: ") for said in found.warnings):
+        likely = (replace(cause, before="doubtful, perhaps because ") for cause in known)
+        doubt = Remark("doubtful", said)
+        return replace(found, remarks=(*found.remarks, doubt, *likely), causes=tuple(one.kind for one in known))
+    if found.mean_confidence < FITS and any(one.kind == "partial" for one in found.remarks):
         said = (
             "unsure: what the surfaces have in common fits less well than it should, so what is said to be missing may "
             "only be stretched: look along its edge, or mark points there"
         )
-        found = replace(found, warnings=(*found.warnings, said))
+        found = replace(found, remarks=(*found.remarks, Remark("unsure", said)))
     known = [coarse(found), *(map(deep, used) if found.mean_confidence < FITS else ())]
-    said = tuple(cause for cause in known if cause is not None)
-    texts, kinds = tuple(cause.text for cause in said), tuple(cause.kind for cause in said)
-    return replace(found, warnings=(*found.warnings, *texts), causes=kinds)
+    told = tuple(cause for cause in known if cause is not None)
+    return replace(found, remarks=(*found.remarks, *told), causes=tuple(cause.kind for cause in told))
 
 
 _Both = tuple[Surface, Surface]
@@ -116,7 +121,7 @@ def _with_main_parts(
             continue
         if again.mean_confidence > DOUBTFUL:
             said = "the largest parts do not belong together: others, which do, are taken for the main ones"
-            return replace(again, warnings=(said, *again.warnings)), (one, other), used
+            return replace(again, remarks=(Remark("other parts", said), *again.remarks)), (one, other), used
     if found is None:
         assert reason is not None
         raise reason
@@ -149,7 +154,7 @@ def _of_main_parts(
             found, source, target = rim
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
-    return replace(found, warnings=(*joined, *said, *found.warnings)), (source, target)
+    return replace(found, remarks=(*joined, *said, *found.remarks)), (source, target)
 
 
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:

@@ -25,6 +25,7 @@ from ..surface.tidy import Cleaned, Piece, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
 from .objective import interior, source_points
+from .remark import Remark
 from .settings import AlignSettings
 
 LITTLE = 0.02
@@ -164,13 +165,14 @@ class Surface:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
-        return self.notes_with(other_parts=False)
+        return tuple(one.sentence for one in self.remarks(other_parts=False))
 
-    def notes_with(self, other_parts: bool) -> tuple[str, ...]:
-        """Return `notes`, without a word about smaller parts if these are aligned too."""
+    def remarks(self, *, other_parts: bool) -> tuple[Remark, ...]:
+        """Return what was done to the mesh, and whether it is narrow; not what was left out, if that is aligned too."""
         rough = f"'{self.mesh.name}' is rough or noisy: smoothed, for the computation only"
         smoothed = (rough,) if self.mesh is not self.cleaned.mesh else ()
-        return (*cleaning_notes(self.cleaned, other_parts), *smoothed, *flattening_notes(self.flattening))
+        done = (*cleaning_notes(self.cleaned, other_parts), *smoothed, *_opening_notes(self.flattening))
+        return (*(Remark("done", said) for said in done), *_narrow(self.flattening))
 
 
 def cleaning_notes(tidy: Cleaned, other_parts: bool = False) -> tuple[str, ...]:
@@ -191,12 +193,16 @@ def _tetrahedra(mesh: TriangleMesh) -> Floats:
 
 def flattening_notes(found: Flat) -> tuple[str, ...]:
     """Say which openings were closed for the computation, and where the disc is too narrow for the surface."""
-    lost = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
-    return (*_opening_notes(found), *((lost,) if found.rim_lost > LITTLE else ()))
+    return (*_opening_notes(found), *(one.sentence for one in _narrow(found)))
 
 
 def _opening_notes(found: Flat) -> tuple[str, ...]:
     return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
+
+
+def _narrow(found: Flat) -> tuple[Remark, ...]:
+    said = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
+    return (Remark("narrow", said),) if found.rim_lost > LITTLE else ()
 
 
 def prepare(
