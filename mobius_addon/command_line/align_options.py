@@ -22,7 +22,10 @@ def add_pair_options(parser: argparse.ArgumentParser, several_targets: bool = Fa
     add_repair_options(repair)
     repair.add_argument("--source-outer", type=int, metavar="VERTEX", help=f"of the source: {OUTER_HELP}")
     repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
-    cut = "vertex group or attribute around the piece that is matched, such as a head; 'selection': selected"
+    cut = (
+        "vertex group or attribute around the piece that is matched, such as a head; 'selection': selected; 'seams': "
+        "cut open along marked seams"
+    )
     repair.add_argument("--source-cut", metavar="NAME", default="", help=f"of the source: {cut}")
     repair.add_argument("--target-cut", metavar="NAME", default="", help="the same of the target")
     repair.add_argument(

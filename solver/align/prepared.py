@@ -21,7 +21,7 @@ from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, 
 from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
-from ..surface.tidy import Cleaned, piece_within
+from ..surface.tidy import Cleaned, Piece, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
 from .objective import interior, source_points
@@ -56,8 +56,9 @@ class Surface:
         Further coordinates of the vertices; see `surface.cleaned`.
     tidy : Cleaned or None
         The mesh in order, if it is already.
-    within : (n,) bool or None
-        Vertices among which the piece lies that is to be used; None: all of the mesh is.
+    within : (n,) bool, (k, 2) int or None
+        Vertices among which the piece lies that is to be used, or edges along which the mesh is cut open, its largest
+        piece being used; None: all of the mesh is.
     measured : (n, d) float64 or None
         The descriptors, once they are there.
     points : dict of str to dict of int to (k,) int
@@ -73,7 +74,7 @@ class Surface:
         largest_part: bool = False,
         keys: Floats | None = None,
         tidy: Cleaned | None = None,
-        within: Booleans | None = None,
+        within: Piece | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
@@ -91,8 +92,8 @@ class Surface:
         if self.tidy is not None:
             return self.tidy
         found = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
-        if self.within is None and _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
-            return found.turned()  # a closed surface has an outside by itself
+        if _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
+            found = found.turned()  # a closed surface has an outside by itself
         return found if self.within is None else piece_within(found, self.within)
 
     def piece(self, chosen: Booleans, said: str) -> Surface:
@@ -211,7 +212,7 @@ def prepare(
     outer_vertex: int | None = None,
     largest_part: bool = True,
     keys: Floats | None = None,
-    within: Booleans | None = None,
+    within: Piece | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -228,8 +229,9 @@ def prepare(
         Leave out all parts but the one of largest area.
     keys : (n, d) float64, optional
         Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
-    within : (n,) bool, optional
-        Vertices among which the piece lies that is to be used, such as those of a head.
+    within : (n,) bool or (k, 2) int, optional
+        Vertices among which the piece lies that is to be used, such as those of a head; or edges along which the mesh
+        is cut open, such as seams, of which what is not the largest piece has no counterpart.
     progress : callable, optional
         As for `align`.
 
