@@ -47,6 +47,10 @@ class _Pending:
     place: Place
 
 
+class NothingThere(Refusal):
+    """The source has nothing of what is to be carried."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reading:
     """Everything that a transfer needs of the two objects, as arrays: `carry` may run in a thread of its own."""
@@ -72,8 +76,10 @@ class Reading:
         ------
         Cancelled
             The progress callback returned False.
+        NothingThere
+            Nothing is left to write.
         Refusal
-            Nothing is left to write, or there are more UV maps than Blender allows.
+            There are more UV maps than Blender allows.
         """
         warnings = list(self.warnings)
         layers: list[tuple[_Pending, Carried]] = []
@@ -96,7 +102,7 @@ class Reading:
                 warnings.append(missing_warning(row, name, self.names[0], missing))
             layers.append((pending, carried))
         if not layers and self.textures is None:
-            raise Refusal(_nothing(self.names[0], self.settings, warnings))
+            raise NothingThere(_nothing(self.names[0], self.settings, warnings))
         textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))
         warnings += () if textures is None else textures.notes
         placed, notes = self._placed(self._tidied(layers))
@@ -225,7 +231,7 @@ def read_transfer(
 
     Raises
     ------
-    Refusal
+    NothingThere
         Nothing to carry.
     """
     read, warnings, locked = [], [], []
@@ -275,7 +281,7 @@ def read_transfer(
         rig, notes = read_rig(source, target, keys_carrier or carrier)
         warnings += notes
     if not pending and textures is None:
-        raise Refusal(_nothing(source.name, settings, warnings))
+        raise NothingThere(_nothing(source.name, settings, warnings))
     if users_of(target.data) > 1:
         warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
     warnings += left_behind(source, target, [x.layer.name for x in pending if x.row.kind == "shape-keys"])

@@ -20,6 +20,7 @@ from . import (
     side_by_side,
     swap,
     transfer,
+    try_expressions,
     use_selected,
     wrap,
 )
@@ -36,6 +37,7 @@ _register, _unregister = register_factory(
         align.MOBIUS_OT_align,
         align_selected.MOBIUS_OT_align_selected,
         transfer.MOBIUS_OT_transfer,
+        try_expressions.MOBIUS_OT_try_expressions,
         wrap.MOBIUS_OT_wrap,
         live.MOBIUS_OT_live,
         point_pairs.MOBIUS_OT_add_pair,

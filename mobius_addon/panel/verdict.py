@@ -9,7 +9,8 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
-from ...solver.align.judgement import Concern, Judgement, judged
+from ...solver.align.judgement import Judgement, judged
+from ...solver.align.remark import Remark
 
 LEVELS = {
     "good": (n_("Good: {:.0%} matched"), "CHECKMARK"),
@@ -21,8 +22,9 @@ LEVELS = {
 def judgement_of(found: dict[str, Any]) -> Judgement:
     """Return the verdict that a report holds; of reports of earlier versions, what it would be."""
     if "verdict" not in found:
-        return judged(found.get("mean_confidence", 0.0), found["coverage"], found.get("warnings", ()))
-    concerns = tuple(Concern(**one) for one in found["concerns"])
+        said = (Remark("other", text) for text in found.get("warnings", ()))
+        return judged(found.get("mean_confidence", 0.0), found["coverage"], said)
+    concerns = tuple(Remark(**one) for one in found["concerns"])
     return Judgement(found["verdict"], concerns, tuple(found["notes"]))
 
 

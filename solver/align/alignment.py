@@ -19,6 +19,7 @@ from ..surface.tidy import Cleaned
 from .confidence import evidence, probability, unmatched_share
 from .objective import usual_difference
 from .overlap import Piece
+from .remark import Remark
 from .settings import AlignSettings
 from .whole import Whole
 
@@ -62,10 +63,10 @@ class Alignment:
         there are no others, or were not asked.
     seconds : dict of str to float
         Wall-clock time per stage.
-    warnings : tuple of str
-        What the user should know, each a sentence.
+    remarks : tuple of Remark
+        What the user should know, each a sentence with its kind; `warnings` are the sentences.
     causes : tuple of str
-        Why the map is doubtful, if it is and that is known: kinds of `diagnosis.Cause`.
+        Why the map is doubtful, if it is and that is known: kinds of remarks: see `diagnosis.causes`.
     """
 
     mobius: Mobius | SphereMobius
@@ -86,10 +87,15 @@ class Alignment:
     taken: Rival | None = None
     whole: Whole | None = None
     seconds: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     causes: tuple[str, ...] = ()
     source_cleaned: Cleaned | None = None
     target_cleaned: Cleaned | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, each a sentence."""
+        return tuple(remark.sentence for remark in self.remarks)
 
     @property
     def margin(self) -> float | None:
@@ -110,7 +116,7 @@ class Alignment:
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
 
     def annotated(self, **said: Any) -> Alignment:
-        """Return it with other `seconds`, `warnings`, `causes` or `whole`; what is known of the map is kept."""
+        """Return it with other `seconds`, `remarks`, `causes` or `whole`; what is known of the map is kept."""
         same = replace(self, **said)
         kept = ("matched_weights", "difference", "carried", "evidence", "confidence", "located")
         same.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})

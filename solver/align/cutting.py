@@ -23,6 +23,7 @@ from .dense import drafted_from
 from .mobius_map import roughly_aligned
 from .prepared import Surface
 from .reconsider import UNLIKE, unlike
+from .remark import Remark
 from .settings import AlignSettings
 
 SHRUNK, MUCH = 1e-6, 0.25
@@ -42,7 +43,7 @@ PAIRS = 20_000
 
 def fitting_pieces(
     source: Surface, target: Surface, settings: AlignSettings, clock: Part
-) -> tuple[Surface, Surface, tuple[str, ...]]:
+) -> tuple[Surface, Surface, tuple[Remark, ...]]:
     """Return the surfaces, of one that no disc carries the piece that fits the other, and what is to be said of that.
 
     Raises
@@ -96,7 +97,7 @@ def shrunk(flattening: Flat) -> float:
 
 def _piece_like(
     whole: Surface, other: Surface, reason: str, settings: AlignSettings, clock: Part, *, is_source: bool
-) -> tuple[Surface | None, tuple[str, ...]]:
+) -> tuple[Surface | None, tuple[Remark, ...]]:
     """Return the piece of a surface that is most like the other one, and what is to be said of it.
 
     None where no piece is, and a disc carries the whole, if badly.
@@ -140,7 +141,7 @@ def _piece_like(
     if best is None:
         return None, ()
     said = f"'{name}' {reason}: the piece that fits was found, {best[3].length:.3g} around where it was cut"
-    return best[2], (said,)
+    return best[2], (Remark("piece", said),)
 
 
 def width(flattening: Flat) -> float:

@@ -25,8 +25,9 @@ from .landmarks import usable_landmarks, with_landmarks
 from .objective import compatibility
 from .prepared import Surface
 from .refine import refined
+from .remark import Remark
 from .settings import AlignSettings
-from .sphere_map import searched_sphere
+from .sphere_map import searched_sphere, tied_orientations
 
 
 def roughly_aligned(
@@ -67,7 +68,7 @@ def searched(
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
     )
-    pairs, warnings = usable_landmarks(landmarks, source, target)
+    pairs, remarks = usable_landmarks(landmarks, source, target)
     if len(pairs):
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
@@ -75,7 +76,6 @@ def searched(
         problem = Objective(source.places[source_samples], target.places[target_samples], radius, weights)
     search_all = searched_sphere if source.domain.closed else _both_sides
     found, other, said = search_all(problem, settings, clock)
-    said += unproved(found)
     return Alignment(
         mobius=found.mobius,
         search=found,
@@ -90,24 +90,25 @@ def searched(
         other=other,
         source_cleaned=source_surface.cleaned,
         target_cleaned=target_surface.cleaned,
-        warnings=(*warnings, *said),
+        remarks=(*remarks, *said, *unproved(found)),
     )
 
 
 def challenged(alignment: Alignment, clock: Part) -> Alignment:
     """Look for a rival of what the search found, and refine what is gone on with on all vertices."""
-    found, settings, warnings = alignment.search, alignment.settings, list(alignment.warnings)
+    found, settings, remarks = alignment.search, alignment.settings, alignment.remarks
     source_samples = alignment.source_samples
     clock.begin("rival", "Looking for a rival", 0.75)
     near = settings.reflect_margin * len(source_samples)
     rival = rival_of(alignment, [found.mobius], found.value - near, clock)
     if rival.value >= found.value - near:
-        warnings.append(
+        said = (
             f"ambiguous: a map that sends everything elsewhere scores within "
             f"{100 * max(found.value - rival.value, 0) / len(source_samples):.1f} % of the samples of the best; is the "
             "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
         )
-    alignment = replace(alignment, rival=rival, warnings=tuple(warnings))
+        remarks = (*remarks, Remark("rival", said))
+    alignment = replace(alignment, rival=rival, remarks=remarks)
     clock.begin("refine", "Refining", 0.9)
     return taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
 
@@ -122,12 +123,13 @@ def _require_alike(source: Flat, target: Flat) -> None:
         )
 
 
-def unproved(found: SearchResult) -> list[str]:
+def unproved(found: SearchResult) -> list[Remark]:
     """Say it if a search ran out of time before its proof."""
     if found.certified or isinstance(found, SphereSearchResult):  # which says itself what it has proved
         return []
     share = 100 * found.gap / max(found.upper_bound, 1e-300)
-    return [f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"]
+    said = f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"
+    return [Remark("unproved", said)]
 
 
 def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Part) -> Rival:
@@ -180,8 +182,8 @@ def implied(source: Places, target: Places, weights: Floats, reflected: bool) ->
 
 def _both_sides(
     problem: Objective, settings: AlignSettings, clock: Part
-) -> tuple[SearchResult, SearchResult | None, list[str]]:
-    """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""
+) -> tuple[SearchResult, SearchResult | None, list[Remark]]:
+    """Search the orientations that the settings ask for; return the one to take, the other, and what is to be said."""
     if settings.reflect == "auto" and not _thorough(settings):
         clock.begin("search", "Searching", 0.4)
         plain, turned = search_both(
@@ -228,17 +230,12 @@ def _thorough(settings: AlignSettings) -> bool:
 
 def _decided(
     plain: SearchResult, turned: SearchResult, problem: Objective, settings: AlignSettings
-) -> tuple[SearchResult, SearchResult, list[str]]:
-    """Return the orientation to take, the other, and a warning if they are hardly apart."""
+) -> tuple[SearchResult, SearchResult, list[Remark]]:
+    """Return the orientation to take, the other, and that they are hardly apart, if they are."""
     advantage = (turned.value - plain.value) / len(problem.source)
     chosen = advantage > settings.reflect_margin
-    warnings = []
-    if abs(advantage) <= settings.reflect_margin:
-        warnings.append(
-            f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
-            "taken as not mirrored"
-        )
-    return (turned, plain, warnings) if chosen else (plain, turned, warnings)
+    said = tied_orientations(advantage) if abs(advantage) <= settings.reflect_margin else []
+    return (turned, plain, said) if chosen else (plain, turned, said)
 
 
 def _mirrored(result: SearchResult) -> SearchResult:

@@ -25,7 +25,7 @@ from .tasks import Result, whole_file
 PREPARING = ("samples", "targets", "fill_holes")
 """Settings that prepared surfaces depend on."""
 
-VERSION = 2
+VERSION = 3
 """Of the lines and of what is computed for them: those of another version are done anew."""
 
 

@@ -7,12 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ..mobius import Mobius, conformal_barycentre
+from ..mobius import Mobius
 from ..surface.holes import filled
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
+from .barycentre import conformal_barycentre
 from .circle import lost_rim, on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas

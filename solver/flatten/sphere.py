@@ -16,13 +16,13 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..mobius import spherical_barycentre
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import cotangents, mollified_lengths
 from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.sampling import edge_graph
 from ..surface.statistics import weighted_median
 from ..surface.topology import require_sphere
+from .barycentre import spherical_barycentre
 from .distortion import Distortion, spherical_distortion
 from .domain import SPHERE, Domain
 from .flatten import Flattening

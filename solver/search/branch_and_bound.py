@@ -25,7 +25,7 @@ from ..surface.mesh import Complexes, Floats, Integers
 from .kernels import kernels_for
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
 from .matching import matching
-from .outcome import SearchResult
+from .outcome import TRACED, SearchResult
 from .watch import look, watched
 
 CELLS_AT_ONCE = 64
@@ -178,6 +178,7 @@ class Search:
         self.finished_bound = -np.inf  # of cells too small to split
         self.nodes = 0
         self.proved = 0.0, limit, 0
+        self.started, self.trace = time.perf_counter(), list[SearchProgress]()
         self.slow = False
         self.ended = self.out_of_time = False
 
@@ -214,6 +215,7 @@ class Search:
             cancelled=cancelled,
             out_of_time=self.out_of_time or not (self.ended or cancelled),
             kernels=self.kernels[0].name if self.kernels else "",
+            trace=(*self.trace, SearchProgress(self.value, upper, self.nodes, seconds)),
             counted=(self.sides[self.best_side], self._plain(best)) if self.sides else None,
         )
 
@@ -247,6 +249,7 @@ class Search:
             # cells that ended undecided may turn out worthless: another may yet reach their bound
             while any(map(len, self.frontier)):
                 self.proved = self.value, self.upper_bound, self.nodes
+                self._traced()
                 if self.until(*self.proved):
                     break
                 if time.perf_counter() > deadline:
@@ -257,6 +260,13 @@ class Search:
                 rounds += 1
                 yield
         self.ended = True
+
+    def _traced(self) -> None:
+        """Note what is proved, unless it is hardly more than what was noted last."""
+        value, bound, nodes = self.proved
+        last = self.trace[-1] if self.trace else None
+        if last is None or value > last.value or bound - value < (last.upper_bound - last.value) * (1 - TRACED):
+            self.trace.append(SearchProgress(value, bound, nodes, time.perf_counter() - self.started))
 
     def _round(self, budget: int, pool: ThreadPoolExecutor | None) -> None:
         """Take the best open cells off the frontier, search in each for a while, and put back what is left of them."""

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -107,23 +108,30 @@ def workers_here() -> list[psutil.Process]:
     return [p for p in here.children(recursive=True) if "resource_tracker" not in " ".join(p.cmdline())]
 
 
-def run(count: int, size: int, plan: Plan, out: Path, opened: Open, memory: Memory) -> Collection:
-    shutil.rmtree(out, ignore_errors=True)
-    return collect(specimens(count, size), out, opened, plan=plan, settings=ROUGH, at_a_time=WORKERS, tell=memory)
+def run(count: int, size: int, plan: Plan, refine: str, out: Path, opened: Open, memory: Memory) -> Collection:
+    settings = replace(ROUGH, refine=refine)
+    return collect(specimens(count, size), out, opened, plan=plan, settings=settings, at_a_time=WORKERS, tell=memory)
 
 
 def growth(counts: list[int], size: int, root: Path) -> None:
     print("| plan | specimens | pairs | wall s | s per pair | MB on disk | kB per pair | MB here | MB per worker |")
     print("|" + 9 * "---|")
-    for plan in (Plan("all"), Plan("star", "sheet-0000"), Plan("tree")):
-        for count in counts:
+    for count in counts:
+        shutil.rmtree(root / str(count), ignore_errors=True)
+        # in one folder: of the tree the dense maps alone are new
+        for plan, refine in (
+            (Plan("star", "sheet-0000"), "mobius"),
+            (Plan("star", "sheet-0000"), "dense"),
+            (Plan("all"), "mobius"),
+            (Plan("tree"), "dense"),
+        ):
             memory = Memory({"here": lambda: [psutil.Process()], "worker": workers_here})
             begun = time.perf_counter()
-            found = run(count, size, plan, root / plan.pairs, processes(WORKERS), memory)
+            found = run(count, size, plan, refine, root / str(count), processes(WORKERS), memory)
             wall, pairs = time.perf_counter() - begun, len(found.edges)
             lines, each = (found.folder.root / "pairs.jsonl").stat().st_size / 1024, [x.seconds for x in found.figures]
             print(
-                f"| {plan.pairs} | {count} | {pairs:,} | {wall:.0f} | {np.median(each):.3f} | "
+                f"| {plan.pairs}, {refine} | {count} | {pairs:,} | {wall:.0f} | {np.median(each):.3f} | "
                 f"{on_disk(found.folder.root):.1f} | {lines / pairs:.1f} | {memory.most('here'):.0f} | "
                 f"{memory.most('worker'):.0f} |",
                 flush=True,
@@ -131,7 +139,8 @@ def growth(counts: list[int], size: int, root: Path) -> None:
 
 
 def many(count: int, size: int, root: Path) -> None:
-    """A star of many on a cluster, refined by Möbius maps and then densely to each."""
+    """A star of many on a cluster, by Möbius maps."""
+    shutil.rmtree(root / "many", ignore_errors=True)
     (root / "dask").mkdir(parents=True, exist_ok=True)
     script = root / "scheduler.py"
     script.write_text(SCHEDULER, encoding="utf-8")
@@ -150,7 +159,7 @@ def many(count: int, size: int, root: Path) -> None:
     })  # fmt: skip
     begun = time.perf_counter()
     try:
-        found = run(count, size, Plan("star", "sheet-0000"), root / "many", cluster.opened, memory)
+        found = run(count, size, Plan("star", "sheet-0000"), "mobius", root / "many", cluster.opened, memory)
     finally:
         cluster.close()
         server.stdin.close()

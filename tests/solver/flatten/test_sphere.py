@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from spheres import ball, even_points, hull, random_mobius, sphere_points, turned_onto
 
 from solver import MeshError, TriangleMesh
+from solver.flatten.barycentre import spherical_barycentre
 from solver.flatten.distortion import signed_volumes
 from solver.flatten.locate import TriangulatedSphere
 from solver.flatten.sphere import SphereFlattening, flatten_sphere
 from solver.flatten.sphere_injective import collapsed, require_injective, solid_angles, untangled_sphere
-from solver.mobius import spherical_barycentre
 
 
 def assert_injective(found: SphereFlattening) -> None:
