@@ -13,6 +13,7 @@ from .proof import MOBIUS_PT_notes, MOBIUS_PT_proof
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
 from .show import MOBIUS_PT_pictures
+from .targets import MOBIUS_PT_targets
 from .transfer import MOBIUS_PT_transfer, MOBIUS_PT_transfer_settings
 
 
@@ -25,6 +26,7 @@ def _draw_in_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 _register, _unregister = bpy.utils.register_classes_factory(
     (
         MOBIUS_PT_main,
+        MOBIUS_PT_targets,
         MOBIUS_PT_result,
         MOBIUS_PT_proof,
         MOBIUS_PT_notes,

@@ -104,8 +104,8 @@ class Memory:
 
 
 def workers_here() -> list[psutil.Process]:
-    here = psutil.Process()
-    return [p for p in here.children(recursive=True) if "resource_tracker" not in " ".join(p.cmdline())]
+    """Return the processes that this one has begun; the one that watches over shared memory is small."""
+    return psutil.Process().children(recursive=True)
 
 
 def run(count: int, size: int, plan: Plan, refine: str, out: Path, opened: Open, memory: Memory) -> Collection:
