@@ -300,6 +300,7 @@ GERMAN = {
     "The value of the nearest vertex that is matched, along the surface": "Der Wert des nächsten zugeordneten Punkt, entlang der Fläche",
     "Their product": "Ihr Produkt",
     "Their sum": "Ihre Summe",
+    "Closed surfaces have no discs, or the shared layout was removed": "Geschlossene Flächen haben keine Scheiben, oder das gemeinsame Layout wurde entfernt",
     "There is no room for a UV editor: open one by hand": "Für einen UV-Editor ist kein Platz: Einen von Hand öffnen",
     "They keep what they have": "Sie behalten, was sie haben",
     "Those whose names are given": "Die mit den angegebenen Namen",

@@ -56,6 +56,16 @@ def _add_align_options(group: argparse._ArgumentGroup) -> None:
         help="known pairs, one on each line: two vertex numbers, or x y z on the source and x y z on the target in the "
         "axes and units of their files",
     )
+    group.add_argument(
+        "--pairs",
+        metavar="FILE",
+        type=Path,
+        help="corrections, as --landmarks has them: the finished map is bent through them, but for those that "
+        "contradict a map that is sure of itself",
+    )
+    group.add_argument(
+        "--follow-all", action="store_true", help="with --pairs: bend through those that contradict the map, too"
+    )
     group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
     group.add_argument("--targets", type=int, metavar="N", help="target points of the search")
     group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")
@@ -68,6 +78,8 @@ def align_settings(options: argparse.Namespace) -> AlignSettings:
     from ...solver import AlignSettings
     from ..files import Unreadable
 
+    if options.follow_all and options.pairs is None:
+        raise Unreadable("--follow-all is about --pairs: give them")
     names = ("reflect", "refine", "take_rival", "samples", "targets", "radius", "z_max", "time_limit")
     names += ("parts", "fill_holes", "cut", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
