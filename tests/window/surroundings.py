@@ -44,7 +44,7 @@ def steps() -> Wait:
 def example() -> Wait:
     """Load the example by its button, which then stands where Remove Example is."""
     yield 1.0
-    yield from click_on((yield from find("bpy.ops.mobius.load_example")))
+    yield from click_on((yield from find("bpy.ops.mobius.load_example", across=0.75)))
     yield from until(lambda: bpy.context.scene.mobius.target is not None)
     yield from picture("example")
 
