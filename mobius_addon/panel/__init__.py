@@ -14,6 +14,7 @@ from .proof import MOBIUS_PT_notes, MOBIUS_PT_proof
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
 from .show import MOBIUS_PT_pictures
+from .targets import MOBIUS_PT_targets
 from .transfer import MOBIUS_PT_transfer, MOBIUS_PT_transfer_settings
 
 
@@ -27,6 +28,7 @@ _register, _unregister = bpy.utils.register_classes_factory(
     (
         MOBIUS_MT_mend,
         MOBIUS_PT_main,
+        MOBIUS_PT_targets,
         MOBIUS_PT_result,
         MOBIUS_PT_proof,
         MOBIUS_PT_notes,

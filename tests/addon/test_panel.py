@@ -141,7 +141,7 @@ def test_an_edit_changes_the_line() -> None:
 
 def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
-    assert len(panels) == 14
+    assert len(panels) == 15
     for settings in ({"source": None}, {"source": pair[0]}):
         for name, value in settings.items():
             setattr(bpy.context.scene.mobius, name, value)
