@@ -50,7 +50,7 @@ def example() -> Wait:
 
 
 def searched(names: tuple[str, str]) -> Wait:
-    """Search for "mobius" with F3, and run what is found."""
+    """Search for "mobius", as F3 does, and run what is found first."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name in names)
     source, target = (bpy.data.objects[name] for name in names)
@@ -60,8 +60,8 @@ def searched(names: tuple[str, str]) -> Wait:
     bpy.context.preferences.addons[PACKAGE].preferences.after_align = "nothing"
     over_the_viewport()
     yield 0.5
-    pointer("key", "F3")
-    yield 1.0
+    bpy.ops.wm.search_menu("INVOKE_DEFAULT")
+    yield 2.0
     pointer("type", "--delay", "60", "mobius")
     yield from picture("search")
     pointer("key", "Return")
