@@ -41,6 +41,8 @@ GERMAN_SENTENCES = {
     "'{}' has no UV map, and no disc: {}": "„{}“ hat keine UV-Map und keine Scheibe: {}",
     "'{}' has no UV map: unwrap it, or take the source's or the disc": "„{}“ hat keine UV-Map: Abwickeln, oder die der Quelle oder die Scheibe nehmen",
     "'{}' has no face among the vertices that it was to be cut to: choose others": "„{}“ hat keine Fläche zwischen den Punkten, auf die zugeschnitten werden soll: Andere wählen",
+    "'{}' has none of the edges inside along which it was to be cut open: mark others": "„{}“ hat keine der Kanten im Inneren, an denen es aufgeschnitten werden soll: Andere markieren",
+    "'{}' has no edge marked as a seam: mark some in Edit Mode (Edge > Mark Seam)": "„{}“ hat keine als Naht markierte Kante: Welche im Bearbeitungsmodus markieren (Kante > Naht markieren)",
     "'{}' has no faces": "„{}“ hat keine Flächen",
     "'{}' has no textures that a transfer map carries": "„{}“ hat keine Texturen, die eine Übertragungskarte überträgt",
     "'{}' has no vertex group and no attribute of single numbers {} for its mask": "„{}“ hat keine Punktgruppe und keine Eigenschaft einzelner Zahlen {} als Maske",

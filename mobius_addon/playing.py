@@ -94,7 +94,9 @@ class Play:
         strength = strength_at(self.place - self.number)
         for row in (0, 1):
             keys = self._keys(row)
-            for name in self._of(row) if keys is not None else ():
+            if keys is None:
+                continue
+            for name in self._of(row):
                 if name in keys.key_blocks:
                     key = keys.key_blocks[name]
                     shown = strength if name == self.names[self.number][row] else 0.0

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     from ..map_picture import render_map
 
     settings = align_settings(options)
-    inputs = [options.source, options.target, options.landmarks]
+    inputs = [options.source, options.target, options.landmarks, options.pairs]
     require_writable(others=[options.map, options.report, options.picture], inputs=inputs)
     if options.picture:
         if options.picture.suffix.lower() != ".png":

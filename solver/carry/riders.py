@@ -81,7 +81,7 @@ class Riders:
     def __call__(self, displacements: Floats) -> Floats:
         """Return the displacements of the riding vertices, (q, 3), for some of the source's vertices, (n_source, 3)."""
         middle, shift = self.around @ self.source, self.around @ displacements
-        turn = np.empty((self.around.shape[0], 3, 3))
+        turn = np.empty((len(middle), 3, 3))
         for k in range(len(turn)):
             row = slice(*self.around.indptr[k : k + 2])
             at, weight = self.around.indices[row], self.around.data[row]
