@@ -24,7 +24,7 @@ from ..surface.statistics import standardised
 from ..surface.tidy import Cleaned, Piece, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
-from .objective import interior, source_points
+from .objective import covering_radius, interior, source_points
 from .remark import Remark
 from .settings import AlignSettings
 
@@ -81,6 +81,7 @@ class Surface:
         self.keys, self.tidy, self.within = keys, tidy, within
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
+        self._radii: dict[int, Floats] = {}
 
     def known(self, flattening: Flat) -> None:
         """Take from elsewhere what would be computed when it is first asked for."""
@@ -152,6 +153,12 @@ class Surface:
                 self.mesh, count, nowhere, interior(self.flattening), progress
             )
         return self.points["target"][count]
+
+    def target_radii(self, count: int) -> Floats:
+        """Return the radii of the match discs around the `target_points`, (k,), where none is set."""
+        if count not in self._radii:
+            self._radii[count] = covering_radius(self.flattening.places[self.target_points(count)])
+        return self._radii[count]
 
     def _require_inside(self) -> None:
         """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
