@@ -21,6 +21,7 @@ GERMAN_SENTENCES = {
     "'{}' is rough or noisy: smooth or remesh it": "„{}“ ist rau oder verrauscht: Glätten oder neu vernetzen",
     "'{}' is long and narrow: cut it into shorter pieces": "„{}“ ist lang und schmal: In kürzere Stücke zerschneiden",
     "'{}' is long and narrow: angles are lost in the disc along {} of its rim": "„{}“ ist lang und schmal: In der Scheibe gehen längs {} des Randes Winkel verloren",
+    "'{}' is deep, {} of it has hardly any room on a sphere: cut out what is to be matched": "„{}“ ist tief, {} davon haben auf einer Kugel kaum Platz: Ausschneiden, was zugeordnet werden soll",
     "'{}' is deep, {} of it has hardly any room in a disc: cut out what is to be matched": "„{}“ ist tief, {} davon haben in einer Scheibe kaum Platz: Ausschneiden, was zugeordnet werden soll",
     "the surfaces have little in common, {} of one is missing on the other: crop both to that": "Die Flächen haben wenig gemeinsam, {} der einen fehlen auf der anderen: Beide darauf zuschneiden",
     "curvatures differ by {} of their spread where the map is best: are these two of one kind?": "Krümmungen weichen um {} ihrer Streuung voneinander ab, wo die Abbildung am besten ist: Sind diese zwei von einer Art?",
