@@ -80,11 +80,12 @@ class Riders:
 
     def __call__(self, displacements: Floats) -> Floats:
         """Return the displacements of the riding vertices, (q, 3), for some of the source's vertices, (n_source, 3)."""
+        indices, data = np.asarray(self.around.indices), np.asarray(self.around.data)
+        starts = np.asarray(self.around.indptr)
         middle, shift = self.around @ self.source, self.around @ displacements
         turn = np.empty((self.around.shape[0], 3, 3))
         for k in range(len(turn)):
-            row = slice(*self.around.indptr[k : k + 2])
-            at, weight = self.around.indices[row], self.around.data[row]
+            at, weight = (x[starts[k] : starts[k + 1]] for x in (indices, data))
             before = self.source[at] - middle[k]
             after = before + displacements[at] - shift[k]
             turn[k] = (after * weight[:, None]).T @ before
