@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .textures.preview import is_preview_of, leave_out_preview, remove_preview
+from .textures.marks import is_preview_of, leave_out_preview, remove_preview
 
 COLLECTION = "Mobius Side by Side"
 

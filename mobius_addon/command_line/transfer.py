@@ -175,7 +175,14 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
 def _require_writable(options: argparse.Namespace) -> None:
     from ..textures.images import turns_beside
 
-    inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
+    inputs = [
+        options.source,
+        options.target,
+        options.use_map,
+        options.landmarks,
+        options.pairs,
+        options.use_texture_map,
+    ]
     beside = turns_beside(options.texture_map) if options.texture_map else None
     others = [options.map, options.report, options.texture_map, beside, options.sheet]
     data = data_outputs(options)

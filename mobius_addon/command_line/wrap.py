@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     require_writable(
         [options.output],
         [options.map, options.report],
-        inputs=[options.source, options.target, options.landmarks, options.use_map],
+        inputs=[options.source, options.target, options.landmarks, options.pairs, options.use_map],
         overwrite=options.overwrite,
     )
     with opened_pair(options, write=True) as (source, target, notes):

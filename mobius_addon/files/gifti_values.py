@@ -98,7 +98,7 @@ def _nearest(values: np.ndarray, carrier: Carrier) -> np.ndarray:
 
 
 def _between(values: np.ndarray, carrier: Carrier) -> np.ndarray:
-    """Return numbers carried linearly; those that are none count for nothing, and are taken over where they are most."""
+    """Return numbers carried linearly; a place most of which has none gets none."""
     number = np.isfinite(values)
     weight: Floats = carrier.points(number)[0]
     carried, covered = carrier.points(np.where(number, values, 0))
@@ -111,7 +111,7 @@ def _between(values: np.ndarray, carrier: Carrier) -> np.ndarray:
 def _name(intent: int | str) -> str:
     from nibabel.nifti1 import intent_codes
 
-    return intent_codes.niistring[intent]
+    return str(intent_codes.niistring[intent])
 
 
 def _meta(gifti: Any, meta: Any, structure: str | None) -> Any:

@@ -16,6 +16,7 @@ from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
 from ..usable import why_not
 from .help import draw_help
+from .mending import draw_menu, draw_remedies
 from .place import MobiusPanel, draw_sentence, hand_on
 
 
@@ -72,8 +73,10 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if line.selectable:
         button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         button.object_name, button.edit = obj.name, True
+    draw_menu(row, obj, line)
     if line.remedy:
         column.prop(settings, line.remedy, toggle=True)
+    draw_remedies(column, obj, line)
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
+
+from .. import stored_alignment
 
 
 class MobiusPanel:
@@ -20,6 +23,45 @@ class MobiusSubPanel(MobiusPanel):
     """A part of the main panel that can be folded."""
 
     bl_parent_id = "MOBIUS_PT_main"
+
+
+class AlignedPanel(MobiusSubPanel):
+    """A part that is there once the chosen pair has been aligned."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where there is an alignment."""
+        return stored_alignment.pair(context) is not None
+
+
+class ReportPanel(MobiusPanel):
+    """A folded part of the result, about figures of its report."""
+
+    bl_parent_id = "MOBIUS_PT_result"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where there is a report that says something of this."""
+        found = report_of(context)
+        return found is not None and cls.has_something(found)
+
+    @classmethod
+    def has_something(cls, _found: dict[str, Any]) -> bool:
+        """Return whether a report has anything for this part."""
+        return True
+
+
+def report_of(context: bpy.types.Context) -> dict[str, Any] | None:
+    """Return the report of the chosen pair's alignment; None if there is none, or none that can be read."""
+    pair = stored_alignment.pair(context)
+    return stored_alignment.figures(context.scene.mobius.target) if pair is not None else None
+
+
+def is_current(context: bpy.types.Context) -> bool:
+    """Return whether both meshes of the aligned pair are what was aligned."""
+    settings = context.scene.mobius
+    return stored_alignment.why_stale(settings.target, settings.source) is None
 
 
 def hand_on(names: Iterable[str], settings: bpy.types.PropertyGroup, operator: bpy.types.OperatorProperties) -> None:

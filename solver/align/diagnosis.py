@@ -35,6 +35,17 @@ def coarse(found: Alignment) -> Remark | None:
     return Remark("coarse", f"'{name}' is coarse, with {count} vertices inside to tell its shape: subdivide it")
 
 
+def deep(surface: Surface) -> Remark | None:
+    """Return that most of a surface shrinks to nothing in its disc, if it does."""
+    share = shrunk(surface.flattening)
+    if share <= MUCH:
+        return None
+    name = surface.original.name
+    return Remark(
+        "deep", f"'{name}' is deep, {share:.0%} of it has hardly any room in a disc: cut out what is to be matched"
+    )
+
+
 def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Remark, ...]:
     """Return what may be the reason that a map is doubtful, the likeliest first; nothing where none is known.
 
@@ -83,7 +94,6 @@ def _of_surface(surface: Surface) -> list[Remark]:
         result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     if surface.flattening.rim_lost > LITTLE:
         result.append(Remark("narrow", f"'{name}' is long and narrow: cut it into shorter pieces"))
-    elif (share := shrunk(surface.flattening)) > MUCH:
-        text = f"'{name}' is deep, {share:.0%} of it has hardly any room in a disc: cut out what is to be matched"
-        result.append(Remark("deep", text))
+    elif (cause := deep(surface)) is not None:
+        result.append(cause)
     return result

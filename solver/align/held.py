@@ -20,7 +20,7 @@ class Held:
     Attributes
     ----------
     kind : str
-        "narrow", "deep" or "too deep", as in `diagnosis.Cause`.
+        "narrow", "deep" or "too deep", as in `remark.Kind`.
     text : str
         The rest of a sentence about the mesh: what it is, and after a colon what to do about it.
     """

@@ -106,7 +106,7 @@ def collect(
         Begins a `concurrent.futures.Executor`; see `engine.processes`.
     plan : Plan, optional
     settings : AlignSettings, optional
-        Threads are one for each task, whatever it says.
+        Threads are one for each task, and no more is searched than what decides (`thorough`), whatever it says.
     at_a_time : int
         How many tasks the executor works on at a time.
     tell : callable, optional
@@ -117,7 +117,7 @@ def collect(
     ValueError
         Fewer than two specimens could be prepared; two have one name; the template is none of them.
     """
-    plan, settings = plan or Plan(), replace(settings or AlignSettings(), threads=1)
+    plan, settings = plan or Plan(), replace(settings or AlignSettings(), threads=1, thorough=False)
     # a pair's direction is the same whatever is added later
     specimens = sorted(specimens, key=lambda specimen: specimen.name)
     names = [specimen.name for specimen in specimens]

@@ -65,6 +65,10 @@ class Folder:
         """Return where a prepared specimen is."""
         return self.root / "surfaces" / f"{name}.npz"
 
+    def handed(self, name: str) -> Path:
+        """Return where a specimen's mesh is, as it was read, until it is prepared."""
+        return self.root / "surfaces" / f".{name}.mesh.unfinished"
+
     def dense_map(self, source: str, target: str) -> Path:
         """Return where the dense map of a pair is."""
         return self.root / "maps" / f"{source} to {target}.npz"

@@ -10,10 +10,10 @@ from ..align.settings import AlignSettings
 from ..surface.mesh import MeshError
 from .cycles import Edge
 from .engine import Open, completed
-from .folder import Folder, digest, figures_of
+from .folder import PREPARING, Folder, digest, figures_of
 from .pair import Figures
 from .plan import Plan, Specimen, Told
-from .tasks import Compare, Prepare, Result, Task
+from .tasks import Compare, Prepare, Result, Task, write_mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,7 @@ class Work:
         asked = digest(settings, prepare_only=True, largest_part=plan.largest_part)
         new = [x for x in specimens if not self.folder.prepared(x.name, x.stamp, asked)]
         stamps = {specimen.name: specimen.stamp for specimen in specimens}
-        given = {
-            name: value for name, value in asdict(settings).items() if name in ("samples", "targets", "fill_holes")
-        }
+        given = {name: getattr(settings, name) for name in PREPARING}
         count = _Count("preparing", len(specimens), len(specimens) - len(new), self.tell)
 
         def tasks() -> Iterator[tuple[str, Task]]:
@@ -44,13 +42,13 @@ class Work:
                     self.failures[specimen.name] = str(error)
                     count.one(specimen.name, str(error))
                     continue
-                path = str(self.folder.surface(specimen.name).resolve())
-                yield (
-                    specimen.name,
-                    Prepare(specimen.name, mesh.vertices, mesh.faces, keys, given, plan.largest_part, path),
-                )
+                handed, path = self.folder.handed(specimen.name), self.folder.surface(specimen.name)
+                write_mesh(handed, mesh, keys)
+                task = Prepare(specimen.name, str(handed.resolve()), given, plan.largest_part, str(path.resolve()))
+                yield specimen.name, task
 
         for name, result in completed(tasks(), self.opened, self.at_a_time):
+            self.folder.handed(name).unlink(missing_ok=True)
             if (error := result.get("error")) is not None:
                 self.failures[name] = error
             else:

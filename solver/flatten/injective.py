@@ -28,8 +28,8 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
     """Return the map with no triangle turned over, changed around the turned ones alone.
 
     Where few are, as slivers are, their vertices are moved alone (`relocated`). The vertices within some edges of a
-    triangle that is turned all the same become convex combinations of their neighbours, all others
-    stay; where that does not help the surroundings of that place grow, in the end to the whole disc, where Floater ("One-to-one
+    triangle that is turned all the same become convex combinations of their neighbours, all others stay; where that
+    does not help the surroundings of that place grow, in the end to the whole disc, where Floater ("One-to-one
     piecewise linear mappings over triangulations", 2003) proves that it does.
 
     Parameters

@@ -28,6 +28,7 @@ from .domain import SPHERE, Domain
 from .flatten import Flattening
 from .harmonic import riemann_map
 from .injective import untangled
+from .locate import TriangulatedDisc
 from .sphere_injective import require_injective, untangled_sphere
 
 FAR_POINTS = 6
@@ -63,6 +64,11 @@ class SphereFlattening:
     def domain(self) -> Domain:
         """Where the places are."""
         return SPHERE
+
+    @cached_property
+    def triangles(self) -> TriangulatedDisc:
+        """The triangles in the sphere, prepared for point location."""
+        return self.domain.triangulated(self.places, self.mesh.faces)
 
     @property
     def boundary(self) -> Integers:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from fractions import Fraction
@@ -172,6 +172,7 @@ class Search:
         self.best: Any = self.identity
         self.best_side = 0
         self.value = 0.0
+        self.floor = -np.inf  # what is worth no more is not looked for
         self.matches: Integers = np.zeros((0, 2), np.intp)
         self.unlooked = limit  # what is not known to be impossible before there is a frontier
         self.finished_bound = -np.inf  # of cells too small to split
@@ -186,10 +187,15 @@ class Search:
         look(self.halt)
 
     @property
+    def least(self) -> float:
+        """What a transformation has to exceed."""
+        return max(self.value, self.floor)
+
+    @property
     def upper_bound(self) -> float:
         """What no transformation exceeds."""
         tops = [open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier]
-        return float(max(self.value, self.unlooked, self.finished_bound, *tops))
+        return float(max(self.least, self.unlooked, self.finished_bound, *tops))
 
     def progress(self, seconds: float) -> SearchProgress:
         """Return what was proved when the last round ended."""
@@ -230,6 +236,11 @@ class Search:
 
     def run(self, deadline: float, threads: int) -> None:
         """Split cells, best bound first, until none can hold a better transformation, it is enough, or time is up."""
+        for _ in self.rounds(deadline, threads):
+            pass
+
+    def rounds(self, deadline: float, threads: int) -> Iterator[None]:
+        """Do the same, and yield after every round."""
         rounds = 0
         # bounds per open cell and round: few at first, as the best bounds lead to a good value; more later, so that a
         # long search does not spend its time here
@@ -247,6 +258,7 @@ class Search:
                 self.check()
                 self._round(min(8 << rounds // 32, most), pool)
                 rounds += 1
+                yield
         self.ended = True
 
     def _traced(self) -> None:
@@ -274,15 +286,19 @@ class Search:
             left = self._expanded(side, cells[np.argsort(-cells[:, BOUND], kind="stable")], budget, pool)
             self.frontier[side] = np.concatenate([open_[~chosen], left])
             self._improve(side, left)
+        self.close()
+
+    def close(self) -> None:
+        """Take off the frontier what cannot hold a better transformation, or is too small to be split."""
         for side, open_ in enumerate(self.frontier):
-            alive = open_[open_[:, BOUND] > self.value]
+            alive = open_[open_[:, BOUND] > self.least]
             ended = alive[:, HALF] <= SMALLEST_CELL
             self.finished_bound = max(self.finished_bound, alive[ended, BOUND].max(initial=-np.inf))
             self.frontier[side] = alive[~ended]
 
     def _expanded(self, side: int, cells: Floats, budget: int, pool: ThreadPoolExecutor | None) -> Floats:
         """Return what is left of cells after splitting each for a while; the threads share the work."""
-        kernels, value = self.kernels[side], self.value
+        kernels, value = self.kernels[side], self.least
         shares = [cells[k::SHARES] for k in range(min(SHARES, len(cells)))]
         begun = time.perf_counter()
         run = pool.map if pool and self.slow else map
@@ -301,9 +317,9 @@ class Search:
         if len(z) == 0:
             return
         # at the centre of a cell the window's angles are the rotations themselves
-        values, rotations = kernels.rotations(z, self.value, inside[:, [FROM, WIDTH]])
+        values, rotations = kernels.rotations(z, self.least, inside[:, [FROM, WIDTH]])
         k = int(np.argmax(values))
-        if values[k] <= self.value:
+        if values[k] <= self.least:
             return
         z, value, theta = complex(z[k]), float(values[k]), float(rotations[k])
         # a pattern search: the value is a step function, so there is no slope to follow

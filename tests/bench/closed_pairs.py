@@ -4,6 +4,7 @@ import importlib.util
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ AMPLITUDE, WAVES = 0.03, 6.0
 """Of the smooth bend, in roots of the surface's area: the middle of a face moves by 1 to 2 % of the diagonal."""
 
 BONES = ("capitate", "hamate", "lunate", "scaphoid", "trapezium", "trapezoid", "triquetrum", "1mc", "2mc", "3mc")
-"""Of a hand: eight of the wrist that are spheres without repair, and the long ones of thumb, index and middle finger."""
+"""Of a hand: seven of the wrist, and the long ones of thumb, index and middle finger; spheres without repair."""
 
 TEETH = (("K04", "K05"), ("i14", "i15"), ("H10", "H19"), ("x02", "x17"))
 
@@ -39,7 +40,7 @@ def capped(mesh: TriangleMesh) -> tuple[TriangleMesh, np.ndarray]:
     names = [loop, *(count + size * k + np.arange(size) for k in range(RINGS - 1))]
     last = count + size * (RINGS - 1)
     faces = [mesh.faces]
-    for outer, ring in zip(names, names[1:], strict=False):
+    for outer, ring in pairwise(names):
         a, b, c, d = outer, np.roll(outer, -1), np.roll(ring, -1), ring
         faces += [np.stack([b, a, d], axis=1), np.stack([b, d, c], axis=1)]
     faces.append(np.stack([np.roll(names[-1], -1), names[-1], np.full(size, last)], axis=1))
@@ -184,7 +185,7 @@ def _package(name: str, inside: str) -> Path | None:
     """Return a folder of a package that ships surfaces, without importing it; None, and says so, if it is not there."""
     found = importlib.util.find_spec(name)
     if found is None or not found.submodule_search_locations:
-        print(f"skipped: the package '{name}' is not installed: uv sync --group compare")
+        print(f"skipped: the package '{name}' is not installed: uv sync --group anatomy")
         return None
     return Path(found.submodule_search_locations[0]) / inside
 

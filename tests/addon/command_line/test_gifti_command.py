@@ -167,6 +167,24 @@ def test_the_wrapped_surface_is_where_the_target_is(halves: Path, capsys: pytest
     assert nibabel.load(out).get_arrays_from_intent("pointset")[0].meta[STRUCTURE] == "CortexRight"
 
 
+def test_the_picture_shows_both_spheres_in_one_frame(halves: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture, pair = halves / "spheres.png", (halves / "left.surf.gii", halves / "right.surf.gii")
+    assert run(capsys, "align", *pair, "--picture", halves / "spheres.jpg", *FEW)[0] == 2
+    assert run(capsys, "align", *pair, "--picture", picture, *FEW)[0] == 0
+    image = bpy.data.images.load(str(picture))
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    rgb = pixels.reshape(height, width, 4)[..., :3]
+    # source from in front and from behind, then the target: alike one by one, and no others
+    views = np.split(rgb[height // 5 :, : width // 4 * 4], 4, axis=1)
+    apart = np.array([[np.abs(one - two).mean() for two in views] for one in views])
+    assert apart[0, 2] < 0.03
+    assert apart[1, 3] < 0.03
+    assert apart[0, 1] > 0.1
+    assert apart[0, 3] > 0.1
+
+
 def test_polygons_are_written_as_triangles_in_the_world(tmp_path: Path) -> None:
     mesh = bpy.data.meshes.new("Quad")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
