@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from ..solver import Alignment
 from ..solver.flatten.sphere import Flat
-from ..solver.surface.mesh import Floats
+from ..solver.surface.mesh import Floats, Integers
 from .demo.pictures import colored_mesh, flat_material, hues, put, render, rings, studio, upright, write
 
 RELIEF = 0.35
@@ -39,7 +39,7 @@ class Side:
     """
 
     places: Floats
-    faces: Floats
+    faces: Integers
     colors: Floats
     points: Floats
     caption: str
