@@ -14,6 +14,7 @@ GERMAN_SENTENCES = {
     "doubtful: more likely than not the map errs by more than {} % of the source's diagonal": "Zweifelhaft: Die Abbildung irrt eher mehr als weniger um über {} % der Diagonale der Quelle",
     "{} on a boundary or in no face left out": "{} an einem Rand oder in keiner Fläche ausgelassen",
     "the largest parts do not belong together: others, which do, are taken for the main ones": "Die größten Teile gehören nicht zusammen: Andere, die es tun, gelten als die Hauptteile",
+    "'{}' is not symmetric: its shape keys stay as they came": "„{}“ ist nicht symmetrisch: Die Formschlüssel bleiben, wie sie ankamen",
     "only one orientation was searched: try mirrored too": "Nur eine Orientierung wurde gesucht: Auch gespiegelt versuchen",
     "only one orientation was searched: try not mirrored too": "Nur eine Orientierung wurde gesucht: Auch nicht gespiegelt versuchen",
     "'{}' is coarse, with {} vertices inside to tell its shape: subdivide it": "„{}“ ist grob, mit {} Punkten im Inneren, die die Form zeigen: Unterteilen",
