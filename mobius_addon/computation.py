@@ -27,6 +27,7 @@ from ..solver import (
 from ..solver.align.prepared import cleaning_notes, flattening_notes
 from ..solver.flatten.distortion import signed_areas
 from ..solver.surface.mesh import Booleans, Floats, Integers, plural
+from ..solver.surface.tidy import Piece
 from .kept_surfaces import surface_of
 from .mesh_data import Refusal
 
@@ -119,14 +120,15 @@ def aligned(
     *,
     largest_part: bool = True,
     keys: tuple[Floats | None, Floats | None] = (None, None),
-    within: tuple[Booleans | None, Booleans | None] = (None, None),
+    within: tuple[Piece | None, Piece | None] = (None, None),
     landmarks: Integers | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> tuple[Alignment, Correspondence]:
     """Return the alignment of two meshes put in order, and their correspondence in the triangles they came with.
 
     What was done to the meshes comes first among the alignment's warnings. `keys` are what shape keys say of which
-    vertices belong together, `within` the vertices of the pieces that are to be matched. See `solver.align`.
+    vertices belong together, `within` the vertices of the pieces that are to be matched, or the edges that cut
+    them out. See `solver.align`.
     """
     source_surface, target_surface = (
         surface_of(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..surface.tidy import Cleaned
 from .confidence import evidence, probability, unmatched_share
 from .objective import usual_difference
 from .overlap import Piece
+from .remark import Remark
 from .settings import AlignSettings
 from .whole import Whole
 
@@ -61,10 +63,10 @@ class Alignment:
         there are no others, or were not asked.
     seconds : dict of str to float
         Wall-clock time per stage.
-    warnings : tuple of str
-        What the user should know, each a sentence.
+    remarks : tuple of Remark
+        What the user should know, each a sentence with its kind; `warnings` are the sentences.
     causes : tuple of str
-        Why the map is doubtful, if it is and that is known: kinds of `diagnosis.Cause`.
+        Why the map is doubtful, if it is and that is known: kinds of remarks: see `diagnosis.causes`.
     """
 
     mobius: Mobius | SphereMobius
@@ -85,15 +87,23 @@ class Alignment:
     taken: Rival | None = None
     whole: Whole | None = None
     seconds: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     causes: tuple[str, ...] = ()
     source_cleaned: Cleaned | None = None
     target_cleaned: Cleaned | None = None
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, each a sentence."""
+        return tuple(remark.sentence for remark in self.remarks)
+
+    @property
     def margin(self) -> float | None:
-        """By how much of the samples the chosen orientation beat the other; None if only one was searched."""
-        return None if self.other is None else (self.search.value - self.other.value) / len(self.source_samples)
+        """By how much of the samples the chosen orientation beat the other, at least; None if only one was searched."""
+        if self.other is None:
+            return None
+        most = self.other.value if self.other.out_of_time else self.other.upper_bound
+        return (self.search.value - most) / len(self.source_samples)
 
     @property
     def rival_margin(self) -> float | None:
@@ -104,6 +114,13 @@ class Alignment:
         if self.rival is None or self.rival.out_of_time or self.search.out_of_time:
             return None
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
+
+    def annotated(self, **said: Any) -> Alignment:
+        """Return it with other `seconds`, `remarks`, `causes` or `whole`; what is known of the map is kept."""
+        same = replace(self, **said)
+        kept = ("matched_weights", "difference", "carried", "evidence", "confidence", "located")
+        same.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
+        return same
 
     @property
     def value(self) -> float:
@@ -205,8 +222,7 @@ class Alignment:
         face, barycentric = np.full(size, -1), np.zeros((size, 3))
         if self.overlap is None:
             used = np.flatnonzero(self.target.mesh.used)
-            disc = self.source.domain.triangulated(self.source.places, self.source.mesh.faces)
-            face[used], barycentric[used] = disc.locate(self.carried[used])
+            face[used], barycentric[used] = self.source.triangles.locate(self.carried[used])
             return face, barycentric
         parts = self.overlap
         inner, weights = parts.alignment.located

@@ -15,6 +15,7 @@ from .agreement import trust
 from .alignment import Alignment
 from .overlap import piece, shared
 from .pieces import overlap_of
+from .remark import Remark
 
 PARTIAL = 0.02
 """Share of either surface's area without a counterpart from which on the rest is cut out and aligned anew."""
@@ -68,7 +69,7 @@ def bent_densely(
                 break
         if max(left_out(source, target, here, there)) > PARTIAL:
             overlap = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
-    warnings = found.warnings
+    remarks = found.remarks
     missing = left_out(source, target, here, there)
     if max(missing) > PARTIAL:
         apart = " and ".join(
@@ -76,17 +77,17 @@ def bent_densely(
             for share, name in zip(missing, ("source", "target"), strict=True)
             if share > SETTLED
         )
-        warnings += (f"partial overlap: {apart} without a counterpart on the other surface",)
+        remarks += (Remark("partial", f"partial overlap: {apart} without a counterpart on the other surface"),)
     if overlap is None:
         clock.begin("bend", "Bending", 0.5)
         bending = finished(draft, source, target, progress=clock.within(0.5, 1.0))
-        return replace(found, bending=bending, counterpart=there, warnings=warnings)
+        return replace(found, bending=bending, counterpart=there, remarks=remarks)
     # what the whole discs left open the pieces may decide
-    warnings = tuple(said for said in warnings if not said.startswith("ambiguous: "))
-    warnings += tuple(f"in the overlap: {said}" for said in overlap.alignment.warnings)
+    remarks = tuple(one for one in remarks if one.kind != "rival")
+    remarks += tuple(replace(one, before=f"in the overlap: {one.before}") for one in overlap.alignment.remarks)
     counterpart = np.zeros(len(target.places), bool)
     counterpart[overlap.target.vertices] = overlap.alignment.counterpart
-    found = replace(found, overlap=overlap, warnings=warnings)
+    found = replace(found, overlap=overlap, remarks=remarks)
     # straight sides may cross the jags of a cut, though none is turned over in the piece's own disc
     areas = signed_areas(found.carried, target.mesh.faces) * (-1 if found.mobius.reflected else 1)
     counterpart[target.mesh.faces[areas <= 0]] = False

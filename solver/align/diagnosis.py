@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .alignment import Alignment
 from .confidence import FITTED
 from .cutting import MUCH, shrunk
 from .prepared import LITTLE, Surface
 from .reconsider import UNLIKE
+from .remark import Kind, Remark
 
 FEW = FITTED // 2
 """Source points below which a surface is called too coarse: of 8 sheets with 30 vertices inside 3 were claimed where
@@ -18,7 +17,7 @@ CROPPED = 0.3
 """Share of either surface without a counterpart from which on the map may well be wrong: up to 30 % cut from one scan
 all maps come out right, with 30 % cut from both 2 of 40 do not."""
 
-MENDED = {
+MENDED: dict[str, tuple[Kind, str]] = {
     "edge joined along which": ("slit", "is cut open along edges: see whether they belong together and merge them"),
     "edges joined along which": ("slit", "is cut open along edges: see whether they belong together and merge them"),
     "far off the surface put back": ("spike", "has vertices far off the surface: smooth or delete them"),
@@ -27,41 +26,38 @@ MENDED = {
 """What `surface.cleaned` says it has done, what kind of cause that is, and how it is told."""
 
 
-@dataclass(frozen=True)
-class Cause:
-    """A likely cause of a doubtful map.
-
-    Attributes
-    ----------
-    kind : str
-        "coarse", "one way", "steps", "rough", "slit", "spike", "handle", "narrow", "deep", "cropped" or "unlike".
-    text : str
-        The cause, and after a colon what to do about it.
-    """
-
-    kind: str
-    text: str
-
-
-def coarse(found: Alignment) -> Cause | None:
+def coarse(found: Alignment) -> Remark | None:
     """Return that the source is too coarse, if it is."""
     count = len(found.source_samples)
     if count >= min(FEW, found.settings.samples):
         return None
     name = found.source.mesh.name
-    return Cause("coarse", f"'{name}' is coarse, with {count} vertices inside to tell its shape: subdivide it")
+    return Remark("coarse", f"'{name}' is coarse, with {count} vertices inside to tell its shape: subdivide it")
 
 
-def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Cause, ...]:
-    """Return what may be the reason that a map is doubtful, the likeliest first; nothing where none is known."""
-    result: list[Cause] = []
+def deep(surface: Surface) -> Remark | None:
+    """Return that much of a surface shrinks to nothing in its disc or on its sphere, if it does."""
+    share = shrunk(surface.flattening)
+    if share <= MUCH:
+        return None
+    where = "on a sphere" if surface.flattening.domain.closed else "in a disc"
+    said = f"'{surface.original.name}' is deep, {share:.0%} of it has hardly any room {where}"
+    return Remark("deep", f"{said}: cut out what is to be matched")
+
+
+def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Remark, ...]:
+    """Return what may be the reason that a map is doubtful, the likeliest first; nothing where none is known.
+
+    Each says after a colon what to do about it.
+    """
+    result: list[Remark] = []
     if (cause := coarse(found)) is not None:
         result.append(cause)
     for surface in (source, target):
         result += _of_surface(surface)
     if found.settings.reflect != "auto":
         way = "mirrored" if found.settings.reflect == "never" else "not mirrored"
-        result.append(Cause("one way", f"only one orientation was searched: try {way} too"))
+        result.append(Remark("one way", f"only one orientation was searched: try {way} too"))
     if found.counterpart is not None:
         missing = 1 - float(found.target.mesh.vertex_areas @ found.counterpart) / found.target.mesh.area
         if found.overlap is not None:
@@ -70,10 +66,10 @@ def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Cause, .
             text = (
                 f"the surfaces have little in common, {missing:.0%} of one is missing on the other: crop both to that"
             )
-            result.append(Cause("cropped", text))
+            result.append(Remark("cropped", text))
     if (apart := difference(found)) > UNLIKE:
         text = f"curvatures differ by {apart:.1f} of their spread where the map is best: are these two of one kind?"
-        result.append(Cause("unlike", text))
+        result.append(Remark("unlike", text))
     return tuple(result)
 
 
@@ -85,19 +81,18 @@ def difference(found: Alignment) -> float:
     return float(inner.evidence[:, 1] @ areas / areas.sum())
 
 
-def _of_surface(surface: Surface) -> list[Cause]:
-    name, result = surface.original.name, []
+def _of_surface(surface: Surface) -> list[Remark]:
+    name, result = surface.original.name, list[Remark]()
     if any(said.startswith("coordinates in steps") for said in surface.cleaned.changes):
         text = f"'{name}' has coordinates too coarse for its details: move it to the origin before it is exported"
-        result.append(Cause("steps", text))
+        result.append(Remark("steps", text))
     for done, (kind, text) in MENDED.items():
         if any(done in said for said in surface.cleaned.changes):
-            result.append(Cause(kind, f"'{name}' {text}"))
-    if surface.mesh is not surface.cleaned.mesh:
-        result.append(Cause("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
+            result.append(Remark(kind, f"'{name}' {text}"))
     if surface.flattening.rim_lost > LITTLE:
-        result.append(Cause("narrow", f"'{name}' is long and narrow: cut it into shorter pieces"))
-    elif (share := shrunk(surface.flattening)) > MUCH:
-        text = f"'{name}' is deep, {share:.0%} of it has hardly any room in a disc: cut out what is to be matched"
-        result.append(Cause("deep", text))
+        result.append(Remark("narrow", f"'{name}' is long and narrow: cut it into shorter pieces"))
+    elif (cause := deep(surface)) is not None:
+        result.append(cause)
+    if surface.mesh is not surface.cleaned.mesh:
+        result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     return result

@@ -54,7 +54,7 @@ def turned(matched: Alignment) -> Alignment | None:
 
 def _other_side(matched: Alignment, other: SearchResult) -> Alignment:
     """Return the alignment by the search of the other orientation; what was said is of the one and its rival."""
-    return replace(matched, search=other, other=matched.search, rival=None, warnings=tuple(unproved(other)))
+    return replace(matched, search=other, other=matched.search, rival=None, remarks=tuple(unproved(other)))
 
 
 def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]:

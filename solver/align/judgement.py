@@ -1,14 +1,13 @@
 """Whether a map can be believed, in one word: the one place that decides, for panel, command line and collections.
 
 A pure function of how sure the map is where it claims anything, of how much of the target it matches, and of the
-sentences that `align` says beside it.
+remarks that `align` makes beside it.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,59 +16,15 @@ from .alignment import Alignment
 from .confidence import MATCHED
 from .diagnosis import CROPPED
 from .reconsider import DOUBTFUL, FITS
+from .remark import Kind, Remark
 
 Level = Literal["good", "check", "doubtful"]
 
 ENOUGH = 1 - CROPPED
 """Share of the target that has to be matched for a map to be called good: as far as cropped scans came out right."""
 
-_KINDS: tuple[tuple[str, str], ...] = (
-    ("note", r"for the computation only$"),
-    ("note", r"no counterpart on '.*'(: vertex groups and shape keys come from the surface next to them.*)?$"),
-    ("note", r"(: the piece that fits was found, .* where it was cut|a piece of .* of its area; the rest has no)"),
-    ("note", r"^partial overlap: "),
-    ("doubtful", r"^doubtful: "),
-    ("orientation", r"^ambiguous orientation"),
-    ("rival", r"^ambiguous: "),
-    ("unproved", r"^not proved optimal"),
-    ("reconsidered", r"^reconsidered: "),
-    ("other parts", r"^the largest parts do not belong together"),
-    ("landmarks", r" on a boundary or in no face left out$"),
-    ("coarse", r" is coarse, with "),
-    ("one way", r"^only one orientation was searched"),
-    ("steps", r" has coordinates too coarse for its details"),
-    ("rough", r" is rough or noisy"),
-    ("slit", r" is cut open along edges: "),
-    ("spike", r" has vertices far off the surface: "),
-    ("handle", r" has handles, as a cup has: "),
-    ("unsure", r"^unsure: "),
-    ("narrow", r" is long and narrow: "),
-    ("deep", r" is deep, .* hardly any room in a disc"),
-    ("cropped", r"^the surfaces have little in common"),
-    ("unlike", r"^curvatures differ by "),
-)
-"""Kinds of sentences, causes named as `diagnosis.Cause.kind`; the first pattern that is found counts.
-
-How much is missing, which "partial overlap" tells, counts as coverage.
-"""
-
-_PREFIX = re.compile(r"^(in the overlap: |doubtful, perhaps because )+")
-
-
-@dataclass(frozen=True)
-class Concern:
-    """One sentence about a map, and its kind.
-
-    Attributes
-    ----------
-    kind : str
-        "note" for what was merely done, a kind of `_KINDS`, or "other".
-    text : str
-        The sentence, without what leads to it.
-    """
-
-    kind: str
-    text: str
+DONE: frozenset[Kind] = frozenset({"done", "no counterpart", "piece", "partial"})
+"""Kinds of remarks that speak neither for nor against a map; how much is missing counts as coverage."""
 
 
 @dataclass(frozen=True)
@@ -81,24 +36,18 @@ class Judgement:
     level : "good", "check" or "doubtful"
         Good: nothing speaks against it. Check: something is open, so look before it is used. Doubtful: more likely
         wrong than right.
-    concerns : tuple of Concern
-        What speaks against it, each once.
+    concerns : tuple of Remark
+        What speaks against it, each once, without what leads to it.
     notes : tuple of str
         What was done, which speaks for or against nothing.
     """
 
     level: Level
-    concerns: tuple[Concern, ...]
+    concerns: tuple[Remark, ...]
     notes: tuple[str, ...]
 
 
-def concern(warning: str) -> Concern:
-    """Return a warning of `align` with its kind."""
-    text = _PREFIX.sub("", warning)
-    return Concern(next((kind for kind, pattern in _KINDS if re.search(pattern, text)), "other"), text)
-
-
-def judged(confidence: float, coverage: float, warnings: Iterable[str]) -> Judgement:
+def judged(confidence: float, coverage: float, remarks: Iterable[Remark]) -> Judgement:
     """Return how far a map can be believed.
 
     Parameters
@@ -107,30 +56,30 @@ def judged(confidence: float, coverage: float, warnings: Iterable[str]) -> Judge
         Mean confidence where the map claims anything: `Alignment.mean_confidence`.
     coverage : float
         Share of the target, or of the piece of it that was to be matched, that is matched.
-    warnings : iterable of str
-        `Alignment.warnings`.
+    remarks : iterable of Remark
+        `Alignment.remarks`.
 
-    >>> judged(0.96, 0.99, ["'Head': 1 opening (12 edges) closed, for the computation only"]).level
+    >>> judged(0.96, 0.99, [Remark("done", "'Head': 1 opening (12 edges) closed, for the computation only")]).level
     'good'
     >>> judged(0.96, 0.4, []).level
     'check'
     >>> judged(0.4, 0.99, []).level
     'doubtful'
     """
-    found = list(dict.fromkeys(concern(said) for said in warnings))
-    concerns = tuple(one for one in found if one.kind != "note")
+    found = list(dict.fromkeys(replace(remark, before="") for remark in remarks))
+    concerns = tuple(one for one in found if one.kind not in DONE)
     if confidence <= DOUBTFUL or coverage <= 0 or any(one.kind == "doubtful" for one in concerns):
         level: Level = "doubtful"
     elif confidence < FITS or coverage < ENOUGH or concerns:
         level = "check"
     else:
         level = "good"
-    return Judgement(level, concerns, tuple(one.text for one in found if one.kind == "note"))
+    return Judgement(level, concerns, tuple(one.text for one in found if one.kind in DONE))
 
 
 def judge(found: Alignment) -> Judgement:
     """Return how far an alignment can be believed: `judged` of its main parts."""
-    return judged(found.mean_confidence, coverage(found), found.warnings)
+    return judged(found.mean_confidence, coverage(found), found.remarks)
 
 
 def coverage(found: Alignment) -> float:

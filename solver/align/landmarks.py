@@ -8,6 +8,7 @@ import numpy.typing as npt
 from ..flatten.sphere import Flat
 from ..surface.mesh import Booleans, Floats, Integers, Places, plural
 from ..surface.tidy import Cleaned
+from .remark import Remark
 
 REACH = 0.1
 """Pseudo-hyperbolic radius within which a landmark counts as hit: twice what Möbius maps of scans err by, 0.03 roots of
@@ -37,15 +38,15 @@ def own_landmarks(pairs: npt.ArrayLike | None, source: Cleaned, target: Cleaned)
     return np.stack(columns, axis=1).astype(np.intp)
 
 
-def usable_landmarks(given: Integers | None, source: Flat, target: Flat) -> tuple[Integers, list[str]]:
-    """Return the (source vertex, target vertex) rows that can be used, (l, 2), and warnings about the others."""
+def usable_landmarks(given: Integers | None, source: Flat, target: Flat) -> tuple[Integers, list[Remark]]:
+    """Return the (source vertex, target vertex) rows that can be used, (l, 2), and what is to be said of the others."""
     if given is None or given.size == 0:
         return np.empty((0, 2), np.intp), []
     # nan compares false, so loose vertices drop out here too
     inside = _inside(source, given[:, 0]) & _inside(target, given[:, 1])
     left_out = int((~inside).sum())
-    warnings = [f"{plural(left_out, 'landmark')} on a boundary or in no face left out"] if left_out else []
-    return given[inside], warnings
+    said = f"{plural(left_out, 'landmark')} on a boundary or in no face left out"
+    return given[inside], [Remark("landmarks", said)] if left_out else []
 
 
 def _inside(surface: Flat, vertices: Integers) -> Booleans:

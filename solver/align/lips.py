@@ -11,14 +11,18 @@ from ..surface.mesh import TriangleMesh, plural
 from ..surface.tidy import piece_within
 from ..surface.topology import topology
 from .prepared import Surface
+from .remark import Remark
 
 
-def with_lips_joined(source: Surface, target: Surface) -> tuple[Surface, Surface, tuple[str, ...]]:
+def with_lips_joined(source: Surface, target: Surface) -> tuple[Surface, Surface, tuple[Remark, ...]]:
     """Return the surfaces, each with its lips joined if the other has no opening, and what is to be said of that."""
     first, second = _joined(source, target), _joined(target, source)
     said = tuple(
-        f"'{own.original.name}': {plural((_rim(own.cleaned.mesh) - _rim(new.cleaned.mesh)) // 2, 'edge')} that a shape "
-        f"key opens joined, as '{other.original.name}' has no opening, for the computation only"
+        Remark(
+            "done",
+            f"'{own.original.name}': {plural((_rim(own.cleaned.mesh) - _rim(new.cleaned.mesh)) // 2, 'edge')} that a "
+            f"shape key opens joined, as '{other.original.name}' has no opening, for the computation only",
+        )
         for own, new, other in ((source, first, target), (target, second, source))
         if new is not own
     )

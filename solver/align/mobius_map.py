@@ -11,21 +11,23 @@ from scipy.spatial.transform import Rotation
 
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
+from ..search.both_sides import search_both
 from ..search.branch_and_bound import SearchResult, search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
-from ..search.rival import Rival, best_rival
+from ..search.rival import LOOKED_AT, Rival, best_rival
 from ..search.sphere_rival import best_sphere_rival
 from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
 from ..surface.mesh import Floats, Integers, MeshError, Places
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
-from .objective import compatibility, covering_radius
+from .objective import compatibility
 from .prepared import Surface
 from .refine import refined
+from .remark import Remark
 from .settings import AlignSettings
-from .sphere_map import searched_sphere
+from .sphere_map import searched_sphere, tied_orientations
 
 
 def roughly_aligned(
@@ -61,12 +63,12 @@ def searched(
     problem = Objective(
         source.places[source_samples],
         target.places[target_samples],
-        covering_radius(target.places[target_samples])
+        target_surface.target_radii(settings.targets)
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
     )
-    pairs, warnings = usable_landmarks(landmarks, source, target)
+    pairs, remarks = usable_landmarks(landmarks, source, target)
     if len(pairs):
         rows, radius, weights = with_landmarks(pairs, problem.source, problem.target, problem.radius, problem.weights)
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
@@ -74,7 +76,6 @@ def searched(
         problem = Objective(source.places[source_samples], target.places[target_samples], radius, weights)
     search_all = searched_sphere if source.domain.closed else _both_sides
     found, other, said = search_all(problem, settings, clock)
-    said += unproved(found)
     return Alignment(
         mobius=found.mobius,
         search=found,
@@ -89,24 +90,25 @@ def searched(
         other=other,
         source_cleaned=source_surface.cleaned,
         target_cleaned=target_surface.cleaned,
-        warnings=(*warnings, *said, *unproved(found)),
+        remarks=(*remarks, *said, *unproved(found)),
     )
 
 
 def challenged(alignment: Alignment, clock: Part) -> Alignment:
     """Look for a rival of what the search found, and refine what is gone on with on all vertices."""
-    found, settings, warnings = alignment.search, alignment.settings, list(alignment.warnings)
+    found, settings, remarks = alignment.search, alignment.settings, alignment.remarks
     source_samples = alignment.source_samples
     clock.begin("rival", "Looking for a rival", 0.75)
     near = settings.reflect_margin * len(source_samples)
     rival = rival_of(alignment, [found.mobius], found.value - near, clock)
     if rival.value >= found.value - near:
-        warnings.append(
+        said = (
             f"ambiguous: a map that sends everything elsewhere scores within "
             f"{100 * max(found.value - rival.value, 0) / len(source_samples):.1f} % of the samples of the best; is the "
             "surface symmetric?" + (" The rival is taken, as asked" if settings.take_rival else "")
         )
-    alignment = replace(alignment, rival=rival, warnings=tuple(warnings))
+        remarks = (*remarks, Remark("rival", said))
+    alignment = replace(alignment, rival=rival, remarks=remarks)
     clock.begin("refine", "Refining", 0.9)
     return taking(alignment, rival if settings.take_rival else None, clock.within(0.9, 1.0))
 
@@ -121,12 +123,13 @@ def _require_alike(source: Flat, target: Flat) -> None:
         )
 
 
-def unproved(found: SearchResult) -> list[str]:
+def unproved(found: SearchResult) -> list[Remark]:
     """Say it if a search ran out of time before its proof."""
     if found.certified or isinstance(found, SphereSearchResult):  # which says itself what it has proved
         return []
     share = 100 * found.gap / max(found.upper_bound, 1e-300)
-    return [f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"]
+    said = f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"
+    return [Remark("unproved", said)]
 
 
 def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Part) -> Rival:
@@ -143,6 +146,7 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
         known,
         z_max=found.settings.z_max,
         enough=enough,
+        at_least=LOOKED_AT if _thorough(found.settings) else 0,
         time_limit=found.settings.time_limit,
         threads=found.settings.threads,
         progress=clock.searching(0.15),
@@ -178,8 +182,21 @@ def implied(source: Places, target: Places, weights: Floats, reflected: bool) ->
 
 def _both_sides(
     problem: Objective, settings: AlignSettings, clock: Part
-) -> tuple[SearchResult, SearchResult | None, list[str]]:
-    """Search the orientations that the settings ask for; return the one to take, the other, and warnings."""
+) -> tuple[SearchResult, SearchResult | None, list[Remark]]:
+    """Search the orientations that the settings ask for; return the one to take, the other, and what is to be said."""
+    if settings.reflect == "auto" and not _thorough(settings):
+        clock.begin("search", "Searching", 0.4)
+        plain, turned = search_both(
+            problem,
+            z_max=settings.z_max,
+            margin=settings.reflect_margin * len(problem.source),
+            time_limit=settings.time_limit,
+            threads=settings.threads,
+            progress=clock.searching(0.35),
+        )
+        if plain.cancelled:
+            raise Cancelled
+        return _decided(plain, _mirrored(turned), problem, settings)
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
@@ -204,15 +221,21 @@ def _both_sides(
         results[reflected] = _mirrored(result) if reflected else result
     if len(results) == 1:
         return results[sides[0]], None, []
-    advantage = (results[True].value - results[False].value) / len(problem.source)
+    return _decided(results[False], results[True], problem, settings)
+
+
+def _thorough(settings: AlignSettings) -> bool:
+    return settings.thorough or settings.refine == "dense"
+
+
+def _decided(
+    plain: SearchResult, turned: SearchResult, problem: Objective, settings: AlignSettings
+) -> tuple[SearchResult, SearchResult, list[Remark]]:
+    """Return the orientation to take, the other, and that they are hardly apart, if they are."""
+    advantage = (turned.value - plain.value) / len(problem.source)
     chosen = advantage > settings.reflect_margin
-    warnings = []
-    if abs(advantage) <= settings.reflect_margin:
-        warnings.append(
-            f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the samples; "
-            "taken as not mirrored"
-        )
-    return results[chosen], results[not chosen], warnings
+    said = tied_orientations(advantage) if abs(advantage) <= settings.reflect_margin else []
+    return (turned, plain, said) if chosen else (plain, turned, said)
 
 
 def _mirrored(result: SearchResult) -> SearchResult:

@@ -18,6 +18,7 @@ from .confidence import SURE
 from .mobius_map import implied, improved, roughly_aligned
 from .overlap import Piece, shared
 from .prepared import Surface
+from .remark import Remark
 
 SMALLEST_OVERLAP = 0.1
 """Share of either surface's area below which an overlap is no ground to go on from."""
@@ -120,7 +121,7 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
         return inner
     mobius = implied(expected, disc, np.ones(len(disc)), inner.mobius.reflected)
     said = "ambiguous: the best map of the pieces by themselves sends everything elsewhere"
-    inner = replace(inner, mobius=mobius, warnings=(*inner.warnings, said))
+    inner = replace(inner, mobius=mobius, remarks=(*inner.remarks, Remark("rival", said)))
     return improved(inner, inner.difference)
 
 

@@ -21,10 +21,11 @@ from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, 
 from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
-from ..surface.tidy import Cleaned, piece_within
+from ..surface.tidy import Cleaned, Piece, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
-from .objective import interior, source_points
+from .objective import covering_radius, interior, source_points
+from .remark import Remark
 from .settings import AlignSettings
 
 LITTLE = 0.02
@@ -55,8 +56,9 @@ class Surface:
         Further coordinates of the vertices; see `surface.cleaned`.
     tidy : Cleaned or None
         The mesh in order, if it is already.
-    within : (n,) bool or None
-        Vertices among which the piece lies that is to be used; None: all of the mesh is.
+    within : (n,) bool, (k, 2) int or None
+        Vertices among which the piece lies that is to be used, or edges along which the mesh is cut open, its largest
+        piece being used; None: all of the mesh is.
     measured : (n, d) float64 or None
         The descriptors, once they are there.
     points : dict of str to dict of int to (k,) int
@@ -72,13 +74,14 @@ class Surface:
         largest_part: bool = False,
         keys: Floats | None = None,
         tidy: Cleaned | None = None,
-        within: Booleans | None = None,
+        within: Piece | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
         self.keys, self.tidy, self.within = keys, tidy, within
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
+        self._radii: dict[int, Floats] = {}
 
     def known(self, flattening: Flat) -> None:
         """Take from elsewhere what would be computed when it is first asked for."""
@@ -90,8 +93,8 @@ class Surface:
         if self.tidy is not None:
             return self.tidy
         found = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
-        if self.within is None and _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
-            return found.turned()  # a closed surface has an outside by itself
+        if _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
+            found = found.turned()  # a closed surface has an outside by itself
         return found if self.within is None else piece_within(found, self.within)
 
     def piece(self, chosen: Booleans, said: str) -> Surface:
@@ -114,7 +117,7 @@ class Surface:
         if found.rim_lost > LOST:
             raise MeshError(
                 f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
-                "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
+                "its rim would fall together in points: cut it into pieces that are at most eight times as long as wide"
             )
         tidy = self.cleaned.mesh
         return found if found.mesh is tidy else replace(found, exact=tidy.vertices)
@@ -151,6 +154,12 @@ class Surface:
             )
         return self.points["target"][count]
 
+    def target_radii(self, count: int) -> Floats:
+        """Return the radii of the match discs around the `target_points`, (k,), where none is set."""
+        if count not in self._radii:
+            self._radii[count] = covering_radius(self.flattening.places[self.target_points(count)])
+        return self._radii[count]
+
     def _require_inside(self) -> None:
         """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
         inside = int(interior(self.flattening).sum())
@@ -163,13 +172,14 @@ class Surface:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the mesh for the computation, each a sentence."""
-        return self.notes_with(other_parts=False)
+        return tuple(one.sentence for one in self.remarks(other_parts=False))
 
-    def notes_with(self, other_parts: bool) -> tuple[str, ...]:
-        """Return `notes`, without a word about smaller parts if these are aligned too."""
+    def remarks(self, *, other_parts: bool) -> tuple[Remark, ...]:
+        """Return what was done to the mesh, and whether it is narrow; not what was left out, if that is aligned too."""
         rough = f"'{self.mesh.name}' is rough or noisy: smoothed, for the computation only"
         smoothed = (rough,) if self.mesh is not self.cleaned.mesh else ()
-        return (*cleaning_notes(self.cleaned, other_parts), *smoothed, *flattening_notes(self.flattening))
+        done = (*cleaning_notes(self.cleaned, other_parts), *smoothed, *_opening_notes(self.flattening))
+        return (*(Remark("done", said) for said in done), *_narrow(self.flattening))
 
 
 def cleaning_notes(tidy: Cleaned, other_parts: bool = False) -> tuple[str, ...]:
@@ -190,12 +200,16 @@ def _tetrahedra(mesh: TriangleMesh) -> Floats:
 
 def flattening_notes(found: Flat) -> tuple[str, ...]:
     """Say which openings were closed for the computation, and where the disc is too narrow for the surface."""
-    lost = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
-    return (*_opening_notes(found), *((lost,) if found.rim_lost > LITTLE else ()))
+    return (*_opening_notes(found), *(one.sentence for one in _narrow(found)))
 
 
 def _opening_notes(found: Flat) -> tuple[str, ...]:
     return (f"'{found.mesh.name}': {closing(found.holes)}, for the computation only",) if found.holes else ()
+
+
+def _narrow(found: Flat) -> tuple[Remark, ...]:
+    said = f"'{found.mesh.name}' is long and narrow: angles are lost in the disc along {found.rim_lost:.0%} of its rim"
+    return (Remark("narrow", said),) if found.rim_lost > LITTLE else ()
 
 
 def prepare(
@@ -205,7 +219,7 @@ def prepare(
     outer_vertex: int | None = None,
     largest_part: bool = True,
     keys: Floats | None = None,
-    within: Booleans | None = None,
+    within: Piece | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -222,8 +236,9 @@ def prepare(
         Leave out all parts but the one of largest area.
     keys : (n, d) float64, optional
         Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
-    within : (n,) bool, optional
-        Vertices among which the piece lies that is to be used, such as those of a head.
+    within : (n,) bool or (k, 2) int, optional
+        Vertices among which the piece lies that is to be used, such as those of a head; or edges along which the mesh
+        is cut open, such as seams, of which what is not the largest piece has no counterpart.
     progress : callable, optional
         As for `align`.
 

@@ -20,6 +20,7 @@ from ..surface.mesh import Booleans
 from .alignment import Alignment
 from .dense import bent_densely, drafted_from
 from .hypotheses import Hypothesis, apart, by_pose, further, turned, unlike
+from .remark import Remark
 
 DOUBTFUL = 0.5
 """Mean confidence up to which the whole map is doubted aloud."""
@@ -81,11 +82,10 @@ def reconsidered(
     first : Draft, (n_source,) bool and (n_target,) bool
         What it was bent from, as of `drafted_from`.
     """
-    tie = [said for said in found.warnings if said.startswith("ambiguous orientation")]
-    found = replace(found, warnings=tuple(said for said in found.warnings if said not in tie))
+    found = _without_tie(found)
     if not in_doubt(found):
         return found
-    matched = replace(matched, warnings=tuple(said for said in matched.warnings if said not in tie))
+    matched = _without_tie(matched)
     rough = unlike(matched, first[0], first[2]) * apart(first[0])
     drafts = []
     hypotheses = list(_hypotheses(found, matched, first[0], clock.part(0.0, 0.3, "reconsider")))
@@ -109,6 +109,11 @@ def reconsidered(
         part = clock.part(0.5 + (len(bent) - 1) / (2 * BENT), 0.5 + len(bent) / (2 * BENT), "reconsider")
         bent.append((bent_densely(each.alignment, draft, part, None), each.what))
     return _decided(bent)
+
+
+def _without_tie(found: Alignment) -> Alignment:
+    """Return the alignment without a word about orientations that tie in the search: the bent maps decide."""
+    return replace(found, remarks=tuple(one for one in found.remarks if one.kind != "orientation"))
 
 
 def _same(one: Draft, two: Draft) -> bool:
@@ -152,10 +157,11 @@ def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:
             "ambiguous orientation: what the surfaces have in common matches only mirrored; if they show something "
             "symmetric, these are opposite sides of it"
         )
-    warnings = found.warnings
+    remarks = found.remarks
     if what:
-        warnings = (f"reconsidered: the best map of the search fits less well than {what}, which is taken", *warnings)
-    return replace(found, warnings=(said, *warnings) if said else warnings)
+        text = f"reconsidered: the best map of the search fits less well than {what}, which is taken"
+        remarks = (Remark("reconsidered", text), *remarks)
+    return replace(found, remarks=(Remark("orientation", said), *remarks) if said else remarks)
 
 
 def _ahead(bent: list[tuple[Alignment, str]]) -> tuple[Alignment, str]:

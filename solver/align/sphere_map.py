@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..search.matching import Objective
 from ..search.sphere_search import SphereSearchResult, sphere_search
 from ..stages import Cancelled, Part
+from .remark import Remark
 from .settings import AlignSettings
 
 GAP = 0.05
@@ -17,8 +18,8 @@ MOST_CELLS = 250_000
 
 def searched_sphere(
     problem: Objective, settings: AlignSettings, clock: Part
-) -> tuple[SphereSearchResult, SphereSearchResult | None, list[str]]:
-    """Search the orientations that the settings ask for; return the one to take, the other, and warnings.
+) -> tuple[SphereSearchResult, SphereSearchResult | None, list[Remark]]:
+    """Search the orientations that the settings ask for; return the one to take, the other, and what is to be said.
 
     Rotations decide which orientation it is, and are proved; then all transformations of that one are searched.
     """
@@ -28,20 +29,26 @@ def searched_sphere(
         text = "Searching the reflection" if reflected else "Searching"
         clock.begin("search reflected" if reflected else "search", text, 0.4 + 0.1 * position)
         results[reflected] = _side(problem, settings, clock, reflected, 0.0)
-    warnings, chosen = [], sides[0]
+    said: list[Remark] = []
+    chosen = sides[0]
     if len(results) == 2:
         advantage = (results[True].value - results[False].value) / len(problem.source)
         chosen = advantage > settings.reflect_margin
         if abs(advantage) <= settings.reflect_margin:
-            warnings.append(
-                f"ambiguous orientation: mirrored and not mirrored differ by {100 * abs(advantage):.1f} % of the "
-                "samples; taken as not mirrored"
-            )
+            said += tied_orientations(advantage)
     clock.begin("search", "Searching", 0.6)
     found = _side(problem, settings, clock, chosen, settings.h_max) if settings.h_max else results[chosen]
     if not found.rotations_certified:
-        warnings.append("not proved optimal: time ran out before the rotations were searched to their end")
-    return found, results.get(not chosen), warnings
+        text = "not proved optimal: time ran out before the rotations were searched to their end"
+        said.append(Remark("unproved", text))
+    return found, results.get(not chosen), said
+
+
+def tied_orientations(advantage: float) -> list[Remark]:
+    """Say that the orientations differ by too small a share of the samples, to be taken as mirrored."""
+    share = 100 * abs(advantage)
+    said = f"ambiguous orientation: mirrored and not mirrored differ by {share:.1f} % of the samples; "
+    return [Remark("orientation", said + "taken as not mirrored")]
 
 
 def _side(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..surface.mesh import Floats, Integers
 from ..surface.parts import Parts
+from .remark import Remark
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Whole:
         return paired, len(self.target) - paired, len(self.source) - paired
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Remark, ...]:
         """What the person should know about parts without a counterpart, each a sentence."""
         _, here, there = self.counts()
         target, source = (parts.mesh.name for parts in (self.target, self.source))
@@ -72,7 +73,7 @@ class Whole:
             )
         if there:
             notes.append(f"'{source}': {_of_parts(there, len(self.source))} no counterpart on '{target}'")
-        return tuple(notes)
+        return tuple(Remark("no counterpart", said) for said in notes)
 
 
 def _of_parts(count: int, total: int) -> str:

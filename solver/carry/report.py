@@ -41,7 +41,7 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "source": alignment.source.mesh.name,
         "target": alignment.target.mesh.name,
         "verdict": judgement.level,
-        "concerns": [asdict(one) for one in judgement.concerns],
+        "concerns": [{"kind": one.kind, "text": one.text} for one in judgement.concerns],
         "notes": list(judgement.notes),
         "expected_error": float(matched @ np.where(matched > 0, expected_error(correspondence.confidence), 0))
         / float(matched.sum())
@@ -58,7 +58,11 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         **(
             {
                 "proved": found.proved,
-                "rotation": {"value": found.rotation_value, "upper_bound": found.rotation_bound},
+                "rotation": {
+                    "value": found.rotation_value,
+                    "upper_bound": found.rotation_bound,
+                    "certified": found.rotations_certified,
+                },
             }
             if isinstance(found, SphereSearchResult)
             else {}

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..align.alignment import Alignment
 from ..align.judgement import Judgement, coverage, judged
+from ..align.remark import Remark
 from ..flatten.sphere import require_open
 from ..mobius import Mobius
 from .distance import EvenFlow, continuous_procrustes
@@ -36,7 +37,7 @@ class Figures:
         Whether the map was bent beyond Möbius.
     seconds : float
         Of one processor.
-    warnings : tuple of str
+    remarks : tuple of Remark
     """
 
     value: float
@@ -51,7 +52,7 @@ class Figures:
     distance: float
     dense: bool
     seconds: float
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def mobius(self) -> Mobius:
@@ -59,9 +60,14 @@ class Figures:
         return Mobius(complex(*self.z), self.theta, self.reflected)
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be known of the map, each a sentence."""
+        return tuple(one.sentence for one in self.remarks)
+
+    @property
     def judgement(self) -> Judgement:
         """How far the map can be believed, by itself."""
-        return judged(self.mean_confidence, self.coverage, self.warnings)
+        return judged(self.mean_confidence, self.coverage, self.remarks)
 
     @property
     def cost(self) -> float:
@@ -75,7 +81,7 @@ class Figures:
     @staticmethod
     def read(data: dict[str, Any]) -> Figures:
         """Return the figures from what `plain` gave."""
-        return Figures(**{**data, "z": tuple(data["z"]), "warnings": tuple(data["warnings"])})
+        return Figures(**{**data, "z": tuple(data["z"]), "remarks": tuple(Remark(**one) for one in data["remarks"])})
 
 
 def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
@@ -103,5 +109,5 @@ def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
         distance=distance,
         dense=decisive.bending is not None,
         seconds=seconds,
-        warnings=alignment.warnings,
+        remarks=alignment.remarks,
     )

@@ -7,18 +7,20 @@ from functools import cached_property
 
 import numpy as np
 
-from ..mobius import Mobius, conformal_barycentre
+from ..mobius import Mobius
 from ..surface.holes import filled
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
+from .barycentre import conformal_barycentre
 from .circle import lost_rim, on_circle
 from .circle_packing import packed
 from .distortion import Distortion, distortion, signed_areas
 from .domain import DISC, Domain
 from .harmonic import riemann_map
 from .injective import require_injective, untangled
+from .locate import TriangulatedDisc
 from .mid_edge import mid_edge_map
 
 METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map, "circle-packing": packed}
@@ -69,6 +71,11 @@ class Flattening:
     def loops(self) -> tuple[Integers, ...]:
         """All boundary loops, the outer one first."""
         return (self.boundary, *self.holes)
+
+    @cached_property
+    def triangles(self) -> TriangulatedDisc:
+        """The triangles in the disc, prepared for point location."""
+        return self.domain.triangulated(self.places, self.mesh.faces)
 
     @cached_property
     def distortion(self) -> Distortion:

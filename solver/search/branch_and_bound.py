@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from fractions import Fraction
@@ -175,6 +175,7 @@ class Search:
         self.best: Any = self.identity
         self.best_side = 0
         self.value = 0.0
+        self.floor = -np.inf  # what is worth no more is not looked for
         self.matches: Integers = np.zeros((0, 2), np.intp)
         self.unlooked = limit  # what is not known to be impossible before there is a frontier
         self.finished_bound = -np.inf  # of cells too small to split
@@ -189,10 +190,15 @@ class Search:
         look(self.halt)
 
     @property
+    def least(self) -> float:
+        """What a transformation has to exceed."""
+        return max(self.value, self.floor)
+
+    @property
     def upper_bound(self) -> float:
         """What no transformation exceeds."""
         tops = [open_[:, self.bound_at].max(initial=-np.inf) for open_ in self.frontier]
-        return float(max(self.value, self.unlooked, self.finished_bound, *tops))
+        return float(max(self.least, self.unlooked, self.finished_bound, *tops))
 
     def progress(self, seconds: float) -> SearchProgress:
         """Return what was proved when the last round ended."""
@@ -233,6 +239,11 @@ class Search:
 
     def run(self, deadline: float, threads: int) -> None:
         """Split cells, best bound first, until none can hold a better transformation, it is enough, or time is up."""
+        for _ in self.rounds(deadline, threads):
+            pass
+
+    def rounds(self, deadline: float, threads: int) -> Iterator[None]:
+        """Do the same, and yield after every round."""
         rounds = 0
         # bounds per open cell and round: few at first, as the best bounds lead to a good value; more later, so that a
         # long search does not spend its time here
@@ -250,6 +261,7 @@ class Search:
                 self.check()
                 self._round(min(8 << rounds // 32, most), pool)
                 rounds += 1
+                yield
         self.ended = True
 
     def _traced(self) -> None:
@@ -278,8 +290,12 @@ class Search:
             left = self._expanded(side, cells, budget, pool)
             self.frontier[side] = np.concatenate([open_[~chosen], left])
             self._improve(side, left)
+        self.close()
+
+    def close(self) -> None:
+        """Take off the frontier what cannot hold a better transformation, or is too small to be split."""
         for side, open_ in enumerate(self.frontier):
-            alive = open_[open_[:, self.bound_at] > self.value]
+            alive = open_[open_[:, self.bound_at] > self.least]
             ended = self._settled(alive)
             self.finished_bound = max(self.finished_bound, alive[ended, self.bound_at].max(initial=-np.inf))
             self.frontier[side] = alive[~ended]
@@ -302,7 +318,7 @@ class Search:
 
     def _limits(self) -> tuple[float, ...]:
         """Return what bounds are held against."""
-        return (self.value,)
+        return (self.least,)
 
     def _improve(self, side: int, left: Floats) -> None:
         """Look for a better transformation at the centres of the most promising cells, then around the best of them."""
@@ -313,9 +329,9 @@ class Search:
         if len(z) == 0:
             return
         # at the centre of a cell the window's angles are the rotations themselves
-        values, rotations = kernels.rotations(z, self.value, inside[:, [FROM, WIDTH]])
+        values, rotations = kernels.rotations(z, self.least, inside[:, [FROM, WIDTH]])
         k = int(np.argmax(values))
-        if values[k] <= self.value:
+        if values[k] <= self.least:
             return
         z, value, theta = complex(z[k]), float(values[k]), float(rotations[k])
         # a pattern search: the value is a step function, so there is no slope to follow

@@ -117,7 +117,7 @@ def without_chords(
     on_boundary[boundary] = True
     for _ in range(rounds):
         triangulation = intrinsic_delaunay(triangulation)
-        on_boundary.resize(triangulation.vertex_count)
+        on_boundary = np.pad(on_boundary, (0, triangulation.vertex_count - len(on_boundary)))  # the new ones are inside
         faces, sides = triangulation.faces, triangulation.inner_sides
         face, k = np.divmod(sides, 3)
         chords = sides[on_boundary[faces[face, (k + 1) % 3]] & on_boundary[faces[face, (k + 2) % 3]]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ from .gluing import glue_of, vertices_of_glue
 from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, directed_edges, plural
 
 Value = TypeVar("Value", bound=np.generic)
+
+Piece: TypeAlias = Booleans | Integers
+"""What is used of a mesh: the largest piece among these vertices, (n,) bool, or between these edges, (k, 2) int."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +137,20 @@ class Cleaned:
         return np.bincount(self.origin, areas, self.size).astype(np.float64, copy=False) if self.changes else areas
 
 
-def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
-    """Return the largest piece of a mesh in order that lies among some of the original's vertices, (n_original,).
+def piece_within(tidy: Cleaned, within: Piece) -> Cleaned:
+    """Return the largest piece of a mesh in order among some of the original's vertices, or between some of its edges.
 
     Raises
     ------
     MeshError
-        No face does.
+        No face lies among the vertices, or none of the edges is inside the surface.
     """
+    if within.dtype == np.bool_:
+        return _among(tidy, within.astype(np.bool_, copy=False))
+    return _cut_open(tidy, within.astype(np.int64, copy=False))
+
+
+def _among(tidy: Cleaned, inside: Booleans) -> Cleaned:
     mesh = tidy.mesh
     chosen = inside[tidy.origin][mesh.faces].all(axis=1)
     if not chosen.any():
@@ -152,6 +161,33 @@ def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
     chosen[place[part != np.argmax(area)]] = False
     share = float(mesh.face_areas[chosen].sum() / mesh.area)
     return tidy.only(chosen, f"cut to a piece of {share:.1%} of its area, as asked; the rest has no counterpart")
+
+
+def _cut_open(tidy: Cleaned, edges: Integers) -> Cleaned:
+    mesh, size = tidy.mesh, len(tidy.mesh.vertices)
+    whole = glue_of(mesh.faces, mesh.twins)
+    # by the vertices as they came, so that those that became several are told as one
+    ends = np.sort(tidy.origin[tidy.vertices_for(edges)], axis=1)
+    sides = np.sort(tidy.origin[directed_edges(mesh.faces)], axis=1)
+    marked = np.isin(sides @ [tidy.size, 1], ends @ [tidy.size, 1])
+    inner = int((marked & (mesh.twins >= 0)).sum()) // 2
+    if not inner:
+        raise MeshError(f"'{mesh.name}' has none of the edges inside along which it was to be cut open: mark others")
+    faces, vertex_of, origin = vertices_of_glue(mesh.faces, whole.without(np.flatnonzero(marked)), size)
+    opened = replace(
+        tidy,
+        mesh=TriangleMesh(mesh.vertices[origin], faces, mesh.name),
+        changes=(*tidy.changes, f"cut open along {plural(inner, 'edge')}, as asked"),
+        vertex_of=np.where(tidy.vertex_of >= 0, vertex_of[tidy.vertex_of], -1),
+        origin=tidy.origin[origin],
+    )
+    part = glue_of(faces, opened.mesh.twins).parts(len(faces))
+    area = np.bincount(part, mesh.face_areas)
+    if len(area) == 1:
+        return opened
+    largest = area.argmax()
+    share = area[largest] / mesh.area
+    return opened.only(part == largest, f"to a piece of {share:.1%} of its area; the rest has no counterpart")
 
 
 def pinholes(mesh: TriangleMesh) -> Integers:

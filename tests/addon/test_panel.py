@@ -3,6 +3,7 @@
 import json
 import math
 import string
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,11 +15,19 @@ from scenes import QUICK, make_object, make_sheet, positions
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import jobs, panel, preset_menus, topology_cache  # noqa: E402
+from mobius_extension.mobius_addon import (  # noqa: E402
+    jobs,
+    panel,
+    preset_menus,
+    stored_alignment,
+    topology_cache,
+    verdict,
+)
 from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
 from mobius_extension.solver import Progress  # noqa: E402
 from mobius_extension.solver.align.judgement import judged  # noqa: E402
+from mobius_extension.solver.align.remark import Remark  # noqa: E402
 
 
 class Layout:
@@ -132,7 +141,7 @@ def test_an_edit_changes_the_line() -> None:
 
 def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
-    assert len(panels) == 14
+    assert len(panels) == 15
     for settings in ({"source": None}, {"source": pair[0]}):
         for name, value in settings.items():
             setattr(bpy.context.scene.mobius, name, value)
@@ -173,49 +182,57 @@ def test_the_result_begins_with_a_verdict_and_ends_with_a_proof(pair: tuple[Any,
     assert proof.value == ""
 
 
-TIE = "ambiguous orientation: mirrored and not mirrored differ by 1.0 % of the samples; taken as not mirrored"
-RIVAL = "ambiguous: a map that sends everything elsewhere scores within 3.0 % of the samples of the best"
-OPEN = "not proved optimal: a value up to 3.0 % larger was not excluded in the time given"
-DEEP = "'A' is deep, 30% of it has hardly any room in a disc: cut out what is to be matched"
-WAY = "only one orientation was searched: try mirrored too"
-MAYBE = "doubtful, perhaps because "
-DOUBT = "doubtful: more likely than not the map errs by more than 2 % of the source's diagonal"
+TIE = Remark("orientation", "ambiguous orientation: mirrored and not mirrored differ by 1.0 % of the samples")
+RIVAL = Remark("rival", "ambiguous: a map that sends everything elsewhere scores within 3.0 % of the samples")
+OPEN = Remark("unproved", "not proved optimal: a value up to 3.0 % larger was not excluded in the time given")
+DEEP = Remark("deep", "'A' is deep, 30% of it has hardly any room in a disc: cut out what is to be matched")
+WAY = Remark("one way", "only one orientation was searched: try mirrored too", "doubtful, perhaps because ")
+DOUBT = Remark("doubtful", "doubtful: more likely than not the map errs by more than 2 % of the source's diagonal")
+OPENING = Remark("done", "'A': 2 openings (4, 5 edges) closed, for the computation only")
 
 
 @pytest.mark.parametrize(
-    ("warnings", "first", "offered"),
+    ("remarks", "first", "offered"),
     [
         ([TIE], "Check", ["Take Mirrored"]),
         ([RIVAL], "Check", ["Take the Rival"]),
-        (["in the overlap: " + RIVAL, TIE], "Check", ["Take the Rival", "Take Mirrored"]),
+        ([replace(RIVAL, before="in the overlap: "), TIE], "Check", ["Take the Rival", "Take Mirrored"]),
         ([OPEN], "Check", ["Search Without Time Limit"]),
         ([DOUBT], "Doubtful", ["landmarks"]),
-        ([DOUBT, MAYBE + WAY], "Doubtful", ["landmarks", "Search Both Ways"]),
-        ([DOUBT, MAYBE + DEEP], "Doubtful", ["landmarks", "source_cut", "target_cut"]),
-        (["'A': 2 openings (4, 5 edges) closed, for the computation only"], "Good", []),
-        (["something new"], "Check", []),
+        ([DOUBT, WAY], "Doubtful", ["landmarks", "Search Both Ways"]),
+        ([DOUBT, DEEP], "Doubtful", ["landmarks", "source_cut", "target_cut"]),
+        ([OPENING], "Good", []),
+        ([Remark("other", "something new")], "Check", []),
     ],
-)  # fmt: skip
-def test_every_warning_stands_in_the_panel_with_its_remedy(
-    pair: tuple[Any, Any], warnings: list[str], first: str, offered: list[str]
+)
+def test_every_remark_stands_in_the_panel_with_its_remedy(
+    pair: tuple[Any, Any], remarks: list[Remark], first: str, offered: list[str]
 ) -> None:
     bpy.ops.mobius.align(**QUICK | {"reflect": "auto", "refine": "mobius"})
     whole = aligned_report(pair[1])
-    # as reports of earlier versions are, and as they are now
-    earlier = {name: value for name, value in whole.items() if name not in ("verdict", "concerns", "notes")}
-    found = judged(whole["mean_confidence"], whole["coverage"], warnings)
+    found = judged(whole["mean_confidence"], whole["coverage"], remarks)
     concerns = [{"kind": one.kind, "text": one.text} for one in found.concerns]
     now = {"verdict": found.level, "concerns": concerns, "notes": found.notes}
-    for report in (earlier, whole | now):
-        pair[1].data.mobius_alignment.report = json.dumps(report | {"warnings": warnings})
+    pair[1].data.mobius_alignment.report = json.dumps(whole | now)
+    said = [text for text in drawn(panel.MOBIUS_PT_result) if text]
+    assert said[0].startswith(first)
+    rest = said[said.index("Side by Side") + 1 :]
+    buttons = ("Take", "Search", "landmarks", "source_cut", "target_cut")
+    assert [text for text in rest if text.startswith(buttons)] == offered
+    words = " ".join(text for text in rest if text not in offered)
+    assert words == " ".join(one.text for one in found.concerns)
+    assert panel.MOBIUS_PT_notes.poll(bpy.context) == bool(found.notes)
+
+
+def test_what_a_report_of_an_earlier_version_says_is_to_be_checked(pair: tuple[Any, Any]) -> None:
+    bpy.ops.mobius.align(**QUICK)
+    whole = aligned_report(pair[1])
+    earlier = {name: value for name, value in whole.items() if name not in ("verdict", "concerns", "notes")}
+    for warnings, first in (([], "Good"), ([TIE.sentence], "Check")):
+        pair[1].data.mobius_alignment.report = json.dumps(earlier | {"warnings": warnings})
         said = [text for text in drawn(panel.MOBIUS_PT_result) if text]
         assert said[0].startswith(first)
-        rest = said[said.index("Side by Side") + 1 :]
-        buttons = ("Take", "Search", "landmarks", "source_cut", "target_cut")
-        assert [text for text in rest if text.startswith(buttons)] == offered
-        words = " ".join(text for text in rest if text not in offered)
-        assert words == " ".join(one.text for one in found.concerns)
-        assert panel.MOBIUS_PT_notes.poll(bpy.context) == bool(found.notes)
+        assert all(text in " ".join(said) for text in warnings)
 
 
 def test_where_the_map_is_unsure_the_panel_shows_it(pair: tuple[Any, Any]) -> None:
@@ -451,3 +468,15 @@ def test_what_is_kept_and_replaced_is_said_above_the_button(pair: tuple[Any, Any
     bpy.context.scene.mobius.target = source
     bpy.context.scene.mobius.carry_to = "target"
     assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+
+
+def test_what_align_reports_is_what_the_panel_says(pair: tuple[Any, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    """In the same words and figures, so in the interface's language."""
+    source, target = pair
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    found = stored_alignment.figures(target)
+    assert found is not None
+    rows = verdict.verdict_lines(bpy.context.scene, source, found, verdict.judgement_of(found).level)
+    assert len(rows) == 3
+    said = next(line for line in capfd.readouterr().out.splitlines() if "'Source' → 'Target'" in line)
+    assert said == f"Info: 'Source' → 'Target': {'; '.join(rows)}"

@@ -35,10 +35,10 @@ from solver import (  # noqa: E402
     flatten,
     topology,
 )
+from solver.flatten.barycentre import conformal_barycentre  # noqa: E402
 from solver.flatten.distortion import Distortion, angle_errors, distortion  # noqa: E402
 from solver.flatten.flatten import _surface  # noqa: E402
 from solver.flatten.harmonic import _dirichlet_systems  # noqa: E402
-from solver.mobius import conformal_barycentre  # noqa: E402
 from solver.surface.cholesky import nested_dissection_cholesky  # noqa: E402
 from solver.surface.intrinsic_delaunay import without_chords  # noqa: E402
 

@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 from scipy.special import ellipj, ellipk
 
 from solver import Mobius, TriangleMesh
-from solver.mobius import conformal_barycentre
+from solver.flatten.barycentre import conformal_barycentre
 
 
 def rings(count: int, jitter: float = 0.0, seed: int = 0) -> np.ndarray:

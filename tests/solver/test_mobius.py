@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from instances import disc_points
 
 from solver import Mobius
-from solver.mobius import conformal_barycentre, hyperbolic_disc, hyperbolic_distance
+from solver.flatten.barycentre import conformal_barycentre
+from solver.mobius import hyperbolic_disc, hyperbolic_distance
 
 SEEDS = st.integers(0, 2**32 - 1)
 

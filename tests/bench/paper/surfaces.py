@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solver import Mobius, TriangleMesh, align
-from solver.mobius import conformal_barycentre
+from solver.flatten.barycentre import conformal_barycentre
 from solver.search.fit import algebraic_fit, fitted
 from solver.search.measures import q_truth
 

@@ -20,7 +20,7 @@ def found():
 
 def said(found, sure: float, *, reflected: bool):
     """The alignment with a map of which so much is sure everywhere."""
-    result = replace(found, mobius=replace(found.mobius, reflected=reflected), warnings=())
+    result = replace(found, mobius=replace(found.mobius, reflected=reflected), remarks=())
     result.__dict__["confidence"] = np.full(len(found.target.disc), sure)
     return result
 

@@ -17,7 +17,7 @@ from surfaces import (
 )
 
 from solver import Flattening, MeshError, Mobius, TriangleMesh, flatten, topology
-from solver.mobius import conformal_barycentre
+from solver.flatten.barycentre import conformal_barycentre
 
 DISCS = """
 scans/human_face.obj scans/chinese_lion.obj scans/human_brain.obj

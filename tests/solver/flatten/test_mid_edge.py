@@ -3,8 +3,8 @@ import pytest
 from surfaces import largest_error, spherical_cap
 
 from solver import MeshError, Mobius, TriangleMesh, flatten, topology
+from solver.flatten.barycentre import conformal_barycentre
 from solver.flatten.mid_edge import _conjugate, _dipole, _inner_face, mid_edge_map
-from solver.mobius import conformal_barycentre
 from solver.surface.intrinsic_delaunay import IntrinsicTriangulation
 from solver.surface.mesh import twin_sides
 

@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 from surfaces import planar
@@ -95,3 +97,15 @@ def test_no_edge_joins_two_boundary_vertices(rungs):
     assert len(added)
     assert added == pytest.approx(np.full(len(added), 2 * np.pi))
     assert angles(result)[: len(mesh.vertices)] == pytest.approx(angles(start))
+
+
+def test_a_debugger_changes_nothing():
+    """What is traced has more references than what is not."""
+    mesh = ladder(3)
+    boundary = topology(mesh).boundary_loops[0]
+    sys.setprofile(lambda *_: None)
+    try:
+        traced = without_chords(intrinsic(mesh), boundary)
+    finally:
+        sys.setprofile(None)
+    assert np.array_equal(traced.faces, without_chords(intrinsic(mesh), boundary).faces)
