@@ -191,23 +191,17 @@ class _SphereSearch(Search):
     def begin(self, plain: SphereMatching, reflect: bool) -> None:
         """Set up what the search needs."""
         self.unlooked = plain.limit
-        self.turns.begin(plain, reflect)
-        self.sides, self.kernels = self.turns.sides, self.turns.kernels
+        try:
+            self.turns.begin(plain, reflect)
+        finally:
+            self._take_over()
 
     def run(self, deadline: float, threads: int) -> None:
         """Search the rotations to their end, climb from the best, and search all."""
-        turns = self.turns
         try:
-            turns.run(deadline, threads)
-        finally:  # valid wherever it was called off
-            self.best, self.best_side = turns.best, turns.best_side
-            self.value, self.matches = turns.value, turns.matches
-            self.rotation, self.rotation_value, self.rotation_bound = turns.best, turns.value, turns.upper_bound
-            self.nodes, self.out_of_time = turns.nodes, turns.out_of_time
-            if self.z_max == 0:
-                self.finished_bound, self.unlooked, self.ended = turns.upper_bound, -np.inf, turns.ended
-            before = self.unlooked if self.z_max else -np.inf  # of all, nothing is proved yet
-            self.trace = [replace(x, upper_bound=max(x.upper_bound, before)) for x in turns.trace]
+            self.turns.run(deadline, threads)
+        finally:
+            self._take_over()
         if self.z_max == 0 or self.out_of_time:
             return
         self.kernels = [box_kernels_for(side, self.z_max, SMALLEST_CELL, self.halt) for side in self.sides]
@@ -219,6 +213,19 @@ class _SphereSearch(Search):
                 if self.value < problem.limit:
                     self._look(side, points(some), FIRST_STEP / 8)
         super().run(deadline, threads)
+
+    def _take_over(self) -> None:
+        """Take what the search of rotations has found and proved, wherever it was called off."""
+        turns = self.turns
+        self.sides, self.kernels = turns.sides, turns.kernels
+        self.best, self.best_side = turns.best, turns.best_side
+        self.value, self.matches = turns.value, turns.matches
+        self.rotation, self.rotation_value, self.rotation_bound = turns.best, turns.value, turns.upper_bound
+        self.nodes, self.out_of_time = turns.nodes, turns.out_of_time
+        if self.z_max == 0:
+            self.finished_bound, self.unlooked, self.ended = turns.upper_bound, -np.inf, turns.ended
+        before = self.unlooked if self.z_max else -np.inf  # of all, nothing is proved yet
+        self.trace = [replace(x, upper_bound=max(x.upper_bound, before)) for x in turns.trace]
 
     def progress(self, seconds: float) -> SearchProgress:
         """Return what was proved when the last round ended."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,13 @@ from ...mobius import spinors
 from ...surface.mesh import Floats
 from ..box_bounds import BOXES_AT_ONCE, bounds_of, caps_of, pair_coefficients
 from ..matching import Matching
-from ..pairs import MOST_PAIRS, too_many
+from ..pairs import MOST_PAIRS, PAIRS_AT_ONCE, too_many
 from ..watch import Halt, look
 from .boxes import BOUND, COLUMNS, LARGEST, MIDDLE, SIDES
 from .compiled import library
 
-LANES = 4
-"""Pairs that boxes.c looks at together: rows begin at multiples of it."""
+LANES, PLANES = 4, 9
+"""Pairs that boxes.c looks at together, so that rows begin at multiples of it, and numbers of each."""
 
 STACK = 512
 """Open boxes of one subtree at most, as in boxes.c."""
@@ -72,7 +73,7 @@ class CompiledBoxKernels:
         caps = caps_of(problem)
         arrays: dict[str, np.ndarray | None] = {"halt": self.halt, "source": problem.source, "caps": caps}
         arrays["spinors"] = spinors(problem.source).view(np.float64)
-        arrays |= _rows(problem, caps)
+        arrays |= _rows(problem, caps, lambda: look(self.halt))
         # kept, because the structure holds bare addresses
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
@@ -139,7 +140,7 @@ class CompiledBoxKernels:
         return left, spent
 
 
-def _rows(problem: Matching, caps: Floats) -> dict[str, np.ndarray | None]:
+def _rows(problem: Matching, caps: Floats, check: Callable[[], None]) -> dict[str, np.ndarray | None]:
     """Return the pairs as boxes.c wants them: a row for each source point, the heaviest first, or one row for all."""
     n1, n2 = len(problem.source), len(problem.centres)
     held = problem.count <= MOST_HELD
@@ -157,6 +158,7 @@ def _rows(problem: Matching, caps: Floats) -> dict[str, np.ndarray | None]:
         raise too_many(total)
     target, weight = np.zeros((2, total), np.uint32)
     for j, (first, last) in enumerate(zip(problem.starts[:-1].tolist(), problem.starts[1:].tolist(), strict=True)):
+        check()
         units, at = np.ones(last - first, np.uint32), slice(int(start[j]), int(start[j]) + last - first)
         columns = np.arange(n2, dtype=np.uint32)
         if problem.rows is not None:
@@ -166,10 +168,15 @@ def _rows(problem: Matching, caps: Floats) -> dict[str, np.ndarray | None]:
         target[at], weight[at] = columns[order], units[order]
     pairs = None
     if held:
-        owner = np.repeat(np.arange(n1), room)
-        c = pair_coefficients(spinors(problem.source)[owner], caps[target])
-        numbers = np.column_stack([c.view(np.float64), caps[target, 4]])
-        pairs = numbers.reshape(-1, LANES, 9).transpose(0, 2, 1)
+        owner, psi = np.repeat(np.arange(n1), room), spinors(problem.source)
+        pairs = np.empty((total // LANES, PLANES, LANES))
+        for first in range(0, total, PAIRS_AT_ONCE):
+            check()
+            some = slice(first, first + PAIRS_AT_ONCE)
+            c = pair_coefficients(psi[owner[some]], caps[target[some]])
+            numbers = np.column_stack([c.view(np.float64), caps[target[some], 4]])
+            block = slice(first // LANES, (first + PAIRS_AT_ONCE) // LANES)
+            pairs[block] = numbers.reshape(-1, LANES, PLANES).transpose(0, 2, 1)
     return {"start": start, "stop": start + counts, "target": target, "weight": weight, "pairs": pairs}
 
 
