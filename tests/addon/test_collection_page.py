@@ -1,5 +1,7 @@
 """The page of a collection: a tree in which nothing lies on anything else, and names that fit."""
 
+from itertools import pairwise
+
 import pytest
 
 pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
@@ -24,7 +26,7 @@ def test_every_specimen_has_a_place_of_its_own(seed: int) -> None:
         columns.setdefault(column, []).append(row)
     for rows in columns.values():
         rows.sort()
-        assert all(below - above >= 1 for above, below in zip(rows, rows[1:], strict=False))
+        assert all(below - above >= 1 for above, below in pairwise(rows))
 
 
 def test_a_path_may_be_as_long_as_there_are_specimens() -> None:
