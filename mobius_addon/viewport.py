@@ -229,8 +229,8 @@ def _view_of(context: bpy.types.Context, space: bpy.types.SpaceView3D) -> _View:
     )
 
 
-def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
-    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it.
+def edit(context: bpy.types.Context, obj: bpy.types.Object, *, look: bool = True) -> str | None:
+    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it if asked to.
 
     Returns
     -------
@@ -254,10 +254,16 @@ def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
         other.select_set(other == obj)
     layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    if space is not None:
+    if look:
+        look_at_selected(context)
+    return None
+
+
+def look_at_selected(context: bpy.types.Context) -> None:
+    """Have the viewport, where there is one, look at what is selected."""
+    if space_of(context) is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()
-    return None
 
 
 def _toggle_local_view(context: bpy.types.Context) -> None:

@@ -89,7 +89,7 @@ def _placed(path: Path, files: tuple[Imported, Imported], meshes: tuple[Triangle
     for side, (imported, mesh) in enumerate(zip(files, meshes, strict=True)):
         numbered = [k for k, pair in enumerate(pairs) if pair.by_number]
         for k in numbered:
-            number = pairs[k].sides[side]
+            number = int(pairs[k].sides[side])
             if not 0 <= number < len(mesh.vertices):
                 raise Unreadable(
                     f"'{path}', line {pairs[k].line}: '{mesh.name}' has no vertex {number:,}: "
