@@ -32,11 +32,11 @@ def steps() -> Wait:
     yield from searched(names)
     assert bpy.ops.mobius.align("EXEC_DEFAULT", True, **QUICK) == {"FINISHED"}
     bpy.ops.mobius.heat_map("EXEC_DEFAULT", True, measure="confidence")
-    yield from looks(names)
-    yield from modes(names)
     yield from second_window(names)
-    yield from mended()
+    yield from mended(names)
     yield from linked(names)
+    yield from modes(names)
+    yield from looks(names)
     yield from large(names)
     print("[clicks] done", flush=True)
 
@@ -89,9 +89,10 @@ def looks(names: tuple[str, str]) -> Wait:
     yield 1.0
     sidebar = region("UI")
     before = sidebar.width
-    for beside in (-3, 8, 3, 0, -6):  # where its edge can be gripped differs between versions
+    for beside in 3 * (-3, 8, 3, 0, -6):  # where its edge can be gripped differs between versions
         left, y = sidebar.x + beside, screen_height() - (sidebar.y + sidebar.height - 60)
         yield drag(left, y, left + 90, y)
+        yield 1.0
         if region("UI").width != before:
             break
     print(f"[clicks] sidebar {before} -> {region('UI').width} pixels wide", flush=True)
@@ -145,7 +146,7 @@ def second_window(names: tuple[str, str]) -> Wait:
     yield 1.0
 
 
-def mended() -> Wait:
+def mended(names: tuple[str, str]) -> Wait:
     """A mesh that cannot be used says why, and a button beside it mends it."""
     bpy.ops.mesh.primitive_torus_add()
     ring = bpy.context.object
@@ -162,6 +163,8 @@ def mended() -> Wait:
     yield from until(lambda: len(ring.data.vertices) < before)
     yield from picture("mended")
     bpy.data.objects.remove(ring)
+    bpy.context.scene.mobius.target = bpy.data.objects[names[1]]
+    yield 0.5
 
 
 def linked(names: tuple[str, str]) -> Wait:
