@@ -14,13 +14,11 @@ from .guide import DOCS
 PICTURES = {
     "panel.png": ("shown.png", (0, 28, 1322, 1182)),
     "guide-pairs.png": ("point-pairs.png", (0, 28, 1322, 1182)),
-    "overlay.png": ("discs.png", (0, 28, 1040, 1182)),
+    "overlay.png": ("discs.png", (0, 28, 1322, 1182)),
 }
 """By name in docs: which picture of the tests, and which part of it: the viewport, left, top, right and bottom."""
 
 WIDTH = 990
-COLORS = 192
-"""Of the palette: an eighth of the size, and nobody sees it."""
 
 
 def make(shots: Path) -> None:
@@ -30,7 +28,7 @@ def make(shots: Path) -> None:
         if path.is_file():
             whole = Image.open(path).convert("RGB").crop(box)
             small = whole.resize((WIDTH, round(WIDTH * whole.height / whole.width)), Image.Resampling.LANCZOS)
-            small.quantize(COLORS, dither=Image.Dither.NONE).save(DOCS / name, optimize=True)
+            small.save(DOCS / name, optimize=True)
 
 
 if __name__ == "__main__":
