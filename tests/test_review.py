@@ -22,6 +22,7 @@ OPENS_FILES = {
     "mobius_addon/textures/images.py",
     "solver/collection/folder.py",
     "solver/collection/tasks.py",
+    "solver/collection/work.py",
 }
 WORKER = "solver/collection/worker.py"  # in processes of its own, which have to find the extension
 KNOWS_ITS_PLACE = {"mobius_addon/preset_menus.py", "mobius_addon/operators/example.py"}  # presets, the guide
