@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import hand
-from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, until
+from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, undo, until
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
@@ -148,21 +148,26 @@ def second_window(names: tuple[str, str]) -> Wait:
 
 def mended(names: tuple[str, str]) -> Wait:
     """A mesh that cannot be used says why, and a button beside it mends it."""
-    bpy.ops.mesh.primitive_torus_add()
-    ring = bpy.context.object
-    bpy.ops.mesh.primitive_uv_sphere_add(location=(4, 0, 0))
-    for obj in (ring, bpy.context.object):
-        obj.select_set(True)
-    bpy.context.view_layer.objects.active = ring
+    settings = bpy.context.scene.mobius
+    settings.largest_part = False
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=(0, 0, 3))
+    balls = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, location=(3, 0, 3))
+    balls.select_set(True)
+    bpy.context.view_layer.objects.active = balls
     bpy.ops.object.join()
-    before = len(ring.data.vertices)
-    bpy.context.scene.mobius.target = ring
+    name, before = balls.name, len(balls.data.vertices)
+    settings.target = balls
+    bpy.ops.ed.undo_push(message="two parts")
     yield from picture("in-the-way")
     place = yield from find("bpy.ops.mobius.mend")
     yield from click_on(place)
-    yield from until(lambda: len(ring.data.vertices) < before)
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) < before)
     yield from picture("mended")
-    bpy.data.objects.remove(ring)
+    undo()
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) == before)
+    bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.context.scene.mobius.largest_part = True
     bpy.context.scene.mobius.target = bpy.data.objects[names[1]]
     yield 0.5
 
