@@ -50,7 +50,7 @@ def example() -> Wait:
 
 
 def searched(names: tuple[str, str]) -> Wait:
-    """Search for "mobius", as F3 does, and run what is found first."""
+    """Search for "map mobius", as F3 does, and run what is found; a collection may be called Mobius too."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name in names)
     source, target = (bpy.data.objects[name] for name in names)
@@ -62,7 +62,7 @@ def searched(names: tuple[str, str]) -> Wait:
     yield 0.5
     bpy.ops.wm.search_menu("INVOKE_DEFAULT")
     yield 2.0
-    pointer("type", "--delay", "60", "mobius")
+    pointer("type", "--delay", "60", "map mobius")
     yield from picture("search")
     pointer("key", "Return")
     yield from until(lambda: Job.current is None and bool(target.data.mobius_transferred))
