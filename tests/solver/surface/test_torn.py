@@ -7,6 +7,7 @@ from scans import bumps
 
 from solver import cleaned
 from solver.surface.mesh import TriangleMesh
+from solver.surface.topology import topology
 
 
 def torn(old: Damaged, sheet: TriangleMesh, rng: np.random.Generator) -> tuple[Damaged, np.ndarray]:
@@ -36,4 +37,42 @@ def test_a_spike_on_a_cut_is_put_where_the_other_side_is(cut: Damage, seed: int)
     assert [said for said in tidy.changes if "far off" in said] == ["2 vertices far off the surface put back"]
     assert np.allclose(tidy.mesh.vertices[tidy.vertex_of[chosen]], sheet.vertices[new.clean[chosen]])
     assert len(tidy.mesh.faces) == len(sheet.faces)
+    assert (tidy.mesh.twins < 0).sum() == (sheet.twins < 0).sum()
+
+
+@pytest.mark.parametrize("directions", [(1, 2), (1, -1), (3, 1)])
+def test_spikes_beside_each_other_on_the_rim_are_put_back(directions: tuple[int, int]) -> None:
+    """One may lie in the course of the other, and neither be a neighbour to go by."""
+    sheet = bumps(600, seed=2)
+    edge = sheet.edges[np.flatnonzero(np.bincount(sheet.edge_of_side) == 1)[7]]
+    vertices = sheet.vertices.copy()
+    vertices[edge] += 5 * sheet.diagonal * np.array(directions)[:, None] * np.ones(3)
+    tidy = cleaned(TriangleMesh(vertices, sheet.faces, "Scan"))
+    assert tidy.changes == ("2 vertices far off the surface put back",)
+    assert np.linalg.norm(tidy.mesh.vertices[edge] - sheet.vertices[edge], axis=1).max() < 0.1 * sheet.diagonal
+
+
+def test_a_spike_does_not_make_a_part_the_largest() -> None:
+    sheet, small = bumps(600, seed=2), bumps(300, seed=3)
+    inner = int(small.faces[0, 0])
+    other = small.vertices * 0.3 + [3, 0, 0]
+    other[inner] += [0, 0, 60]
+    mesh = TriangleMesh(
+        np.concatenate([sheet.vertices, other]), np.concatenate([sheet.faces, small.faces + len(sheet.vertices)]), "Two"
+    )
+    tidy = cleaned(mesh, largest_part=True)
+    assert tidy.changes == ("1 smaller part left out",)
+    assert np.array_equal(tidy.mesh.faces, sheet.faces)
+
+
+def test_parts_turned_at_random_are_joined_all_along() -> None:
+    """What touches along little while it is many pieces touches along more once some are joined."""
+    rng = np.random.default_rng(4)
+    sheet = bumps(1500, seed=2)
+    faces = sheet.faces.copy()
+    turned = rng.uniform(size=len(faces)) < 0.4
+    faces[turned] = faces[turned][:, [0, 2, 1]]
+    loose = loose_triangles(undamaged(TriangleMesh(sheet.vertices, faces, "Loose")), rng)
+    tidy = cleaned(loose.mesh, fill_holes=True)
+    assert len(topology(tidy.mesh).boundary_loops) == 1
     assert (tidy.mesh.twins < 0).sum() == (sheet.twins < 0).sum()
