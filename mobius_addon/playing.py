@@ -93,12 +93,9 @@ class Play:
             return False
         strength = strength_at(self.place - self.number)
         for row in (0, 1):
-            keys = self._keys(row)
-            if keys is None:
-                continue
+            blocks = {} if (keys := self._keys(row)) is None else keys.key_blocks
             for name in self._of(row):
-                if name in keys.key_blocks:
-                    key = keys.key_blocks[name]
+                if (key := blocks.get(name)) is not None:
                     shown = strength if name == self.names[self.number][row] else 0.0
                     key.value = min(max(shown, key.slider_min), key.slider_max)
         return True

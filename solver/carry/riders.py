@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from ..surface.mesh import Floats, Integers, TriangleMesh
@@ -35,8 +34,10 @@ class Riders:
         Where they are on the source.
     rotation, scale : (q, 3, 3) and (q,) float64
         How lengths and directions come from there.
-    around : (g, n_source) sparse
-        What each rider lies beside: weights that sum to 1.
+    around : tuple of ((k,) int, (k,) float64)
+        What each rider lies beside: vertices of the source and their weights, which sum to 1.
+    source : (n_source, 3) float64
+        The source's vertices.
     """
 
     vertices: Integers
@@ -44,7 +45,7 @@ class Riders:
     places: Floats
     rotation: Floats
     scale: Floats
-    around: csr_array
+    around: tuple[tuple[Integers, Floats], ...]
     source: Floats
 
     @staticmethod
@@ -80,16 +81,15 @@ class Riders:
 
     def __call__(self, displacements: Floats) -> Floats:
         """Return the displacements of the riding vertices, (q, 3), for some of the source's vertices, (n_source, 3)."""
-        middle, shift = self.around @ self.source, self.around @ displacements
-        turn = np.empty((len(middle), 3, 3))
-        for k in range(len(turn)):
-            row = slice(*self.around.indptr[k : k + 2])
-            at, weight = self.around.indices[row], self.around.data[row]
-            before = self.source[at] - middle[k]
-            after = before + displacements[at] - shift[k]
-            turn[k] = (after * weight[:, None]).T @ before
+        middle, shift = np.empty((2, len(self.around), 3))
+        turn = np.empty((len(self.around), 3, 3))
+        for k, (at, weight) in enumerate(self.around):
+            places, moved = self.source[at], displacements[at]
+            middle[k], shift[k] = weight @ places, weight @ moved
+            before = places - middle[k]
+            turn[k] = (weight[:, None] * (before + moved - shift[k])).T @ before
+        still = np.array([not displacements[at].any() for at, _ in self.around])
         turn = nearest_orthogonal(turn)
-        still = np.linalg.norm(shift, axis=1) + np.linalg.norm(abs(self.around) @ np.abs(displacements), axis=1) == 0
         turn[still] = np.eye(3)
         lever = self.places - middle[self.group]
         moved = shift[self.group] + np.einsum("qij,qj->qi", turn[self.group] - np.eye(3), lever)
@@ -108,11 +108,11 @@ def _is_one(correspondence: Correspondence, rows: Integers) -> bool:
 
 def _around(
     correspondence: Correspondence, source: TriangleMesh, target: TriangleMesh, groups: list[Integers], scale: Floats
-) -> csr_array:
-    """Return the weights of source vertices around each rider: those of the piece it is on, as far as it is wide."""
+) -> tuple[tuple[Integers, Floats], ...]:
+    """Return the vertices around each rider, of the piece that it is on, as far as it is wide, with weights."""
     piece, tree = pieces(source.faces, len(source.vertices)), KDTree(source.vertices)
     areas = np.maximum(source.vertex_areas, 1e-12 * source.area)
-    ends, columns, values = [0], [], []
+    found = []
     assert correspondence.leader is not None
     for rows in groups:
         corner = correspondence.source_triangles[correspondence.face[rows[0]]]
@@ -123,9 +123,5 @@ def _around(
         near = np.union1d(near[piece[near] == piece[corner[0]]], corner)
         apart = np.linalg.norm(source.vertices[near] - point, axis=1) / max(reach, 1e-300)
         weight = areas[near] * np.maximum(1 - apart**2, 0.01) ** 2
-        columns.append(near)
-        values.append(weight / weight.sum())
-        ends.append(ends[-1] + len(near))
-    return csr_array(
-        (np.concatenate(values), np.concatenate(columns), np.array(ends)), shape=(len(groups), len(source.vertices))
-    )
+        found.append((near, weight / weight.sum()))
+    return tuple(found)

@@ -145,7 +145,9 @@ def piece_within(tidy: Cleaned, within: Piece) -> Cleaned:
     MeshError
         No face lies among the vertices, or none of the edges is inside the surface.
     """
-    return _among(tidy, within) if within.dtype == np.bool_ else _cut_open(tidy, within)
+    if within.dtype == np.bool_:
+        return _among(tidy, within.astype(np.bool_, copy=False))
+    return _cut_open(tidy, within.astype(np.int64, copy=False))
 
 
 def _among(tidy: Cleaned, inside: Booleans) -> Cleaned:

@@ -1,6 +1,7 @@
 """Expressions from one head to another, of the same template or another, beside the target's own.
 
     uv run --no-sync python -m tests.bench.expressions -o FOLDER [--pairs ict_1:ict_2] [--kept 1,0.6,0.3] [--keys]
+    uv run --no-sync python -m tests.bench.expressions -o FOLDER --pairs ict_1:mpfb_woman --kept 1 --sheet PICTURE.png
 
 The target is another person's head: triangulated, decimated, turned, scaled and moved. Its own expressions, through the
 same, are what ought to arrive. Between heads of one template these are the same displacements on another face, which no
@@ -30,7 +31,9 @@ from mobius_extension.mobius_addon.attributes.expression_names import renamed  #
 
 from solver import AlignSettings, Correspondence, align, correspond, load_map, prepare, save_map  # noqa: E402
 from solver.carry.fitted import is_reflected  # noqa: E402
+from tests.bench.heads.__main__ import run  # noqa: E402
 from tests.bench.heads.people import Head, read_head  # noqa: E402
+from tests.bench.heads.scenes import save_source, save_target  # noqa: E402
 from tests.bench.heads.targets import Target, target_of  # noqa: E402
 from tests.bench.paper.data import DATA, absent  # noqa: E402
 
@@ -38,7 +41,7 @@ from .carrying import by_map, nearest_point, true_map  # noqa: E402
 from .measures import Judge, Score  # noqa: E402
 
 PEOPLE = ("ict_1", "ict_2", "mpfb_woman", "mpfb_man")
-FIGURES = ("whole", "skin", "parts", "like", "gap", "through", "wrong")
+FIGURES = ("whole", "skin", "parts", "like", "far", "gap", "through", "wrong")
 WAYS = ("ours", "without contacts", "frames", "nearest point", "true map")
 
 
@@ -111,6 +114,14 @@ def one(head: Head, other: Head, kept: float, folder: Path) -> dict[str, dict[st
     return rows
 
 
+def draw(pair: str, kept: float, folder: Path, picture: Path) -> None:
+    """Draw a pair by the command that people use."""
+    head, other = (read_head(DATA / "heads", name) for name in pair.split(":"))
+    save_source(head, folder / "source.blend")
+    save_target(target_of(other, kept), folder / "target.blend")
+    run(folder, "sheet", "--only", "shape-keys", "--sheet", str(picture.resolve()))
+
+
 def medians(rows: dict[str, dict[str, Score]], way: str) -> dict[str, float]:
     """Return the median of each figure over the expressions of which there is one."""
     result = {}
@@ -131,11 +142,15 @@ def main() -> None:
     every = [f"{a}:{b}" for a in PEOPLE for b in PEOPLE if a != b]
     parser.add_argument("--pairs", default=",".join(every))
     parser.add_argument("--kept", default="1,0.6,0.3")
+    parser.add_argument("--sheet", type=Path, metavar="PICTURE.png", help="draw the first pair, at the first ratio")
     parser.add_argument("--keys", action="store_true", help="a row for each expression, too")
     options = parser.parse_args()
     if reason := absent("heads"):
         raise SystemExit(reason)
     options.folder.mkdir(parents=True, exist_ok=True)
+    if options.sheet is not None:
+        draw(options.pairs.split(",")[0], float(options.kept.split(",")[0]), options.folder, options.sheet)
+        return
     for pair in options.pairs.split(","):
         head, other = (read_head(DATA / "heads", name) for name in pair.split(":"))
         for kept in map(float, options.kept.split(",")):

@@ -15,6 +15,9 @@ MOVING = 0.05
 FEWEST = 10
 """Vertices from which on something meets."""
 
+APART = 0.5
+"""Share of the longest displacement from which on two lips move differently."""
+
 THROUGH = 0.05
 """Share of the opening from which on a vertex that is behind what it should meet has passed through."""
 
@@ -31,6 +34,12 @@ def likeness(wanted: np.ndarray, got: np.ndarray) -> float:
     return float((wanted * got).sum()) / size if size > 0 else np.nan
 
 
+def size_likeness(wanted: np.ndarray, got: np.ndarray) -> float:
+    """Return the correlation between how far each vertex moves in two fields of displacements."""
+    sizes = [np.linalg.norm(values, axis=1) for values in (wanted, got)]
+    return float(np.corrcoef(*sizes)[0, 1]) if min(size.std() for size in sizes) > 0 else np.nan
+
+
 @dataclass(frozen=True)
 class Score:
     """Figures of one expression, carried in one way; nan where there is nothing to be measured.
@@ -41,6 +50,8 @@ class Score:
         Relative errors over all vertices, those of the skin, and the others.
     like : float
         The cosine on the skin.
+    far : float
+        The correlation of how far the skin's vertices move.
     gap : float
         Of what meets in the target's own expression, the median of the gap left over, beyond that in the target's own,
         for the opening.
@@ -54,6 +65,7 @@ class Score:
     skin: float
     parts: float
     like: float
+    far: float
     gap: float
     through: float
     wrong: float
@@ -73,6 +85,9 @@ class Judge:
         self.meeting = found if len(found.vertex) >= FEWEST else None
         # lips are what meets when an open jaw closes
         lips = find_contacts(places + wanted, np.where(self.skin[:, None], -wanted, 0), self.faces) if opens else None
+        if lips is not None:  # near the corners of the mouth both move alike
+            other = np.einsum("ck,ckd->cd", lips.barycentric, wanted[lips.corners])
+            lips = lips.chosen(np.linalg.norm(wanted[lips.vertex] - other, axis=1) > APART * size.max())
         self.lips = lips if lips is not None and len(lips.vertex) >= FEWEST else None
 
     def score(self, got: np.ndarray) -> Score:
@@ -84,6 +99,7 @@ class Judge:
             relative_error(wanted[skin], got[skin]),
             relative_error(wanted[~skin], got[~skin]) if self.moves_parts else np.nan,
             likeness(wanted[skin], got[skin]),
+            size_likeness(wanted[skin], got[skin]),
             gap,
             through,
             np.nan if self.lips is None else self._wrong(self.lips, got),
