@@ -1,5 +1,7 @@
 """A spike that tears a cut open, along which the surface would be joined."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from damages import Damage, Damaged, islands, loose_triangles, mirror_halves, undamaged
@@ -7,6 +9,7 @@ from scans import bumps
 
 from solver import cleaned
 from solver.surface.mesh import TriangleMesh
+from solver.surface.spikes import without_spikes
 from solver.surface.topology import topology
 
 
@@ -76,3 +79,15 @@ def test_parts_turned_at_random_are_joined_all_along() -> None:
     tidy = cleaned(loose.mesh, fill_holes=True)
     assert len(topology(tidy.mesh).boundary_loops) == 1
     assert (tidy.mesh.twins < 0).sum() == (sheet.twins < 0).sum()
+
+
+@pytest.mark.parametrize("name", [f"hand_{k}_{side}" for k in (0, 1, 2) for side in "ab"] + ["foot_3_a", "ear_7_a"])
+def test_thin_triangles_at_the_rim_of_hand_and_ear_are_no_spikes(
+    real_mesh: Callable[[str], TriangleMesh], name: str
+) -> None:
+    mesh = real_mesh(f"bodyparts/{name}.obj")
+    assert without_spikes(mesh)[1].size == 0
+    rim = np.unique(mesh.edges[np.bincount(mesh.edge_of_side) == 1])
+    vertices = mesh.vertices.copy()
+    vertices[rim[5]] += 4 * mesh.diagonal
+    assert without_spikes(TriangleMesh(vertices, mesh.faces, name))[1].tolist() == [rim[5]]
