@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from damages import Damage, Damaged, islands, loose_triangles, mirror_halves, undamaged
+from damages import Damage, Damaged, handle, islands, loose_triangles, mirror_halves, undamaged
 from scans import bumps
 
 from solver import cleaned
@@ -91,3 +91,19 @@ def test_thin_triangles_at_the_rim_of_hand_and_ear_are_no_spikes(
     vertices = mesh.vertices.copy()
     vertices[rim[5]] += 4 * mesh.diagonal
     assert without_spikes(TriangleMesh(vertices, mesh.faces, name))[1].tolist() == [rim[5]]
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5])
+def test_nothing_is_left_of_a_thin_tube(seed: int) -> None:
+    sheet = bumps(600, seed=2)
+    new = handle(undamaged(sheet), np.random.default_rng(seed))
+    tidy = cleaned(new.mesh, fill_holes=True)
+    assert topology(tidy.mesh).is_disc
+    assert {tuple(sorted(face)) for face in tidy.origin[tidy.mesh.faces].tolist()} == {
+        tuple(sorted(face)) for face in sheet.faces.tolist()
+    }
+    normals = [mesh.face_vectors[np.lexsort(np.sort(faces, axis=1).T)] for mesh, faces in (
+        (tidy.mesh, tidy.origin[tidy.mesh.faces]), (sheet, sheet.faces)
+    )]  # fmt: skip
+    assert np.allclose(*normals)
+    assert tidy.vertex_of[np.unique(sheet.faces)].min() >= 0
