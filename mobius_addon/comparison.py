@@ -50,9 +50,14 @@ def is_shown(context: bpy.types.Context) -> bool:
 
 def copies(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object] | None:
     """Return the copies of source and target that the scene shows, None if it does not show both."""
-    collection = context.scene.collection.children.get(COLLECTION)
-    found = {obj.get(_ROLE): obj for obj in collection.objects} if collection is not None else {}
+    found = {obj[_ROLE]: obj for obj in of_scene(context.scene)}
     return (found["source"], found["target"]) if found.keys() >= {"source", "target"} else None
+
+
+def of_scene(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the copies that a scene shows."""
+    collection = scene.collection.children.get(COLLECTION)
+    return [obj for obj in collection.objects if is_copy(obj)] if collection is not None else []
 
 
 def end(context: bpy.types.Context) -> None:

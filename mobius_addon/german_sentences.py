@@ -22,6 +22,7 @@ GERMAN_SENTENCES = {
     "'{}' is rough or noisy: smooth or remesh it": "„{}“ ist rau oder verrauscht: Glätten oder neu vernetzen",
     "'{}' is long and narrow: cut it into shorter pieces": "„{}“ ist lang und schmal: In kürzere Stücke zerschneiden",
     "'{}' is long and narrow: angles are lost in the disc along {} of its rim": "„{}“ ist lang und schmal: In der Scheibe gehen längs {} des Randes Winkel verloren",
+    "'{}' is deep, {} of it has hardly any room on a sphere: cut out what is to be matched": "„{}“ ist tief, {} davon haben auf einer Kugel kaum Platz: Ausschneiden, was zugeordnet werden soll",
     "'{}' is deep, {} of it has hardly any room in a disc: cut out what is to be matched": "„{}“ ist tief, {} davon haben in einer Scheibe kaum Platz: Ausschneiden, was zugeordnet werden soll",
     "the surfaces have little in common, {} of one is missing on the other: crop both to that": "Die Flächen haben wenig gemeinsam, {} der einen fehlen auf der anderen: Beide darauf zuschneiden",
     "curvatures differ by {} of their spread where the map is best: are these two of one kind?": "Krümmungen weichen um {} ihrer Streuung voneinander ab, wo die Abbildung am besten ist: Sind diese zwei von einer Art?",
@@ -69,6 +70,7 @@ GERMAN_SENTENCES = {
     "'{}' is too coarse for the method '{}': {}": "„{}“ ist zu grob für das Verfahren „{}“: {}",
     "'{}' is too deep or too long for a disc: {}, as parts shrink to 1/10^{} of their area there: cut them off, or cut it into pieces that are about as wide as long": "„{}“ ist zu tief oder zu lang für eine Scheibe: {}, da Teile dort auf 1/10^{} ihrer Fläche schrumpfen: Abschneiden, oder in Stücke zerschneiden, die etwa so breit wie lang sind",
     "'{}' is too long and narrow to be aligned in a disc, where {} of its rim would fall together in points: cut it into pieces that are at most eight times as long as wide": "„{}“ ist zu lang und schmal zum Ausrichten in einer Scheibe, in der {} des Rands in Punkten zusammenfielen: In Stücke zerschneiden, die höchstens achtmal so lang wie breit sind",
+    "'{}' juts out too far for a sphere: {} of it would shrink there by more than a million, parts to 1/10^{} of their area: cut off what juts out, as arms and legs": "„{}“ ragt für eine Kugel zu weit heraus: {} davon würden dort auf weniger als ein Millionstel schrumpfen, Teile auf 1/10^{} ihrer Fläche: Abschneiden, was herausragt, wie Arme und Beine",
     "'{}' juts out too far for a sphere: {}, as parts shrink to 1/10^{} of their area there: cut off what juts out, as arms and legs": "„{}“ ragt für eine Kugel zu weit heraus: {}, da Teile dort auf 1/10^{} ihrer Fläche schrumpfen: Abschneiden, was herausragt, wie Arme und Beine",
     "'{}' lies so far from the origin that its coordinates have steps of {}, at edges of {}: move it to the origin before it is written in single precision": "„{}“ liegt so weit vom Ursprung, dass Koordinaten Schritte von {} haben, bei Kanten von {}: Zum Ursprung bewegen, bevor es in einfacher Genauigkeit geschrieben wird",
     "'{}' needs integer faces of shape (m, 3), not {} {}": "„{}“ braucht ganzzahlige Flächen der Form (m, 3), nicht {} {}",
@@ -140,5 +142,6 @@ GERMAN_SENTENCES = {
     "{} edge": "{} Kante",
     "not proved optimal: time ran out before the rotations were searched to their end": "Nicht als beste bewiesen: Die Zeit war um, bevor alle Drehungen durchsucht waren",
     "'{}' is long and narrow: less exact, as angles are lost along {} of its rim": "„{}“ ist lang und schmal: weniger genau, da längs {} des Randes Winkel verloren gehen",
+    "'{}' juts out too far for a sphere: beside an open surface a piece that fits it is cut out": "„{}“ ragt für eine Kugel zu weit heraus: Neben einer offenen Fläche wird ein passendes Stück ausgeschnitten",
     "'{}' is too deep for one disc: a piece that fits the other surface is cut out, if it has one": "„{}“ ist zu tief für eine Scheibe: Ein Stück, das zur anderen Fläche passt, wird ausgeschnitten, wenn es eines hat",
 }

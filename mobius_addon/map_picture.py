@@ -22,6 +22,10 @@ SPACE, CAPTION = 2.3, 0.3
 """Of each disc or sphere, whose diameter is 2, and of what stands below."""
 
 
+LONGEST = 28
+"""Letters of a name in a caption: half a picture has room for some 60."""
+
+
 @dataclass(frozen=True, eq=False)
 class Side:
     """One surface as it is drawn.
@@ -52,12 +56,17 @@ def sides_of(found: Alignment) -> tuple[Side, Side]:
         (found.source, found.mobius(found.source.places), found.source_samples[rows], found.source_descriptors),
         (found.target, found.target.places, found.target_samples[columns], found.target_descriptors),
     )
-    count = f"{len(rows)} of {len(found.source_samples)} points matched"
+    captions = (", carried by the map", f": {len(rows)} of {len(found.source_samples)} points matched")
     first, second = (
-        _side(flat, places, some, bends[:, 0], f"{flat.mesh.name}{said}")
-        for (flat, places, some, bends), said in zip(shown, (f", carried by the map: {count}", ""), strict=True)
+        _side(flat, places, some, bends[:, 0], f"{_short(Path(flat.mesh.name).name)}{caption}")
+        for (flat, places, some, bends), caption in zip(shown, captions, strict=True)
     )
     return first, second
+
+
+def _short(name: str) -> str:
+    """Return a name that has room below half of a picture."""
+    return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
 
 
 def _side(flat: Flat, places: Any, points: Any, bend: Floats, caption: str) -> Side:
@@ -67,7 +76,7 @@ def _side(flat: Flat, places: Any, points: Any, bend: Floats, caption: str) -> S
     else:
         color, upon = hues(upon), upright(upon)
     shade = 1 - RELIEF * (0.5 - 0.5 * np.tanh(np.nan_to_num(bend)))
-    return Side(upon, flat.mesh.faces, color * shade[:, None], upon[points], Path(caption).name)
+    return Side(upon, flat.mesh.faces, color * shade[:, None], upon[points], caption)
 
 
 def render_map(found: Alignment, path: Path, *, samples: int = 8) -> None:
@@ -88,8 +97,7 @@ def render_map(found: Alignment, path: Path, *, samples: int = 8) -> None:
                 turned = np.array([view, view, 1.0])  # by half a turn about the vertical
                 middle = (left + SPACE * (column + 0.5), 0.0, CAPTION / 2)
                 _put_side(scene, side, turned, middle, closed)
-            seen = ", from in front and from behind" if closed else ""
-            write(scene, side.caption + seen, (left + SPACE * len(views) / 2, -(SPACE + CAPTION) / 2 + 0.1))
+            write(scene, side.caption, (left + SPACE * len(views) / 2, -(SPACE + CAPTION) / 2 + 0.1))
         render(scene, path)
 
 

@@ -15,51 +15,62 @@ from . import comparison, viewport
 
 
 @dataclass(frozen=True)
-class _Shown:
-    """What was selected in a window's view layer, and what its viewports looked at, by name."""
+class _Selection:
+    """What is selected in a view layer, and what is active, by name."""
 
     selected: tuple[str, ...]
     active: str
-    views: viewport.Away
+
+    @staticmethod
+    def of(layer: bpy.types.ViewLayer) -> _Selection:
+        active = layer.objects.active
+        selected = tuple(obj.name for obj in layer.objects if obj.select_get())
+        return _Selection(selected, active.name if active is not None else "")
+
+    def restore(self, layer: bpy.types.ViewLayer) -> None:
+        for obj in layer.objects:
+            obj.select_set(obj.name in self.selected)
+        layer.objects.active = layer.objects.get(self.active)
 
 
-# from the beginning of saving to its end, by scene and view layer
-_shown: dict[tuple[str, str], _Shown] = {}
+# from the beginning of saving to its end: by scene and view layer, which several windows may show, and of all viewports
+_selections: dict[tuple[str, str], _Selection] = {}
+_views: list[viewport.Away] = []
 
 
 @bpy.app.handlers.persistent
 def _on_save(*_: Any) -> None:
-    _shown.clear()
+    _selections.clear()
+    _views.clear()
     comparison.leave_out()
     for context in _windows():
-        layer = context.view_layer
-        if not comparison.is_shown(context):
-            continue
         # in other modes what is selected stays: it is what is edited
-        selected = tuple(obj.name for obj in layer.objects if obj.select_get())
-        active = layer.objects.active.name if layer.objects.active is not None else ""
-        views = viewport.put_away(context)
-        if context.mode == "OBJECT":
+        if comparison.is_shown(context) and context.mode == "OBJECT":
+            _selections.setdefault(_key(context), _Selection.of(context.view_layer))
+    _views.append(viewport.put_away(bpy.context))
+    for context in _windows():
+        if _key(context) in _selections:
             comparison.select_as_before(context)
-        _shown[context.scene.name, layer.name] = _Shown(selected, active, views)
 
 
 @bpy.app.handlers.persistent
 def _on_saved(*_: Any) -> None:
+    copies = [obj for scene in bpy.data.scenes for obj in comparison.of_scene(scene)]
     for context in _windows():
-        objects = context.view_layer.objects
-        shown = _shown.pop((context.scene.name, context.view_layer.name), None)
-        if shown is None:
-            continue
-        found = comparison.copies(context) or ()
-        if context.mode == "OBJECT":
-            for obj in objects:  # a viewport can look alone at what is selected only
-                obj.select_set(obj in found)
-        viewport.put_back(context, shown.views, found)
-        if context.mode == "OBJECT":
-            for obj in objects:
-                obj.select_set(obj.name in shown.selected)
-            objects.active = objects.get(shown.active)
+        if _key(context) in _selections:  # a viewport can look alone at what is selected only
+            for obj in context.view_layer.objects:
+                obj.select_set(obj in copies)
+    for views in _views:
+        viewport.put_back(bpy.context, views, copies)
+    for context in _windows():
+        if found := _selections.get(_key(context)):
+            found.restore(context.view_layer)
+    _selections.clear()
+    _views.clear()
+
+
+def _key(context: bpy.types.Context) -> tuple[str, str]:
+    return context.scene.name, context.view_layer.name
 
 
 def _windows() -> Any:

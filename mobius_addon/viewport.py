@@ -254,10 +254,16 @@ def edit(context: bpy.types.Context, obj: bpy.types.Object, *, look: bool = True
         other.select_set(other == obj)
     layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    if space is not None and look:
+    if look:
+        look_at_selected(context)
+    return None
+
+
+def look_at_selected(context: bpy.types.Context) -> None:
+    """Have the viewport, where there is one, look at what is selected."""
+    if space_of(context) is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()
-    return None
 
 
 def _toggle_local_view(context: bpy.types.Context) -> None:

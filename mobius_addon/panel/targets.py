@@ -10,9 +10,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import stored_alignment
 from ..comparison import is_copy
 from ..operators.choose_target import MOBIUS_OT_choose_target
-from ..verdict import judgement_of
+from ..verdict import LEVELS, judgement_of
 from .place import MobiusSubPanel
-from .verdict import LEVELS
 
 MOST_ROWS = 40
 """Targets that are listed, the doubtful ones first: a panel longer than this is not read."""

@@ -36,14 +36,13 @@ def coarse(found: Alignment) -> Remark | None:
 
 
 def deep(surface: Surface) -> Remark | None:
-    """Return that most of a surface shrinks to nothing in its disc, if it does."""
+    """Return that much of a surface shrinks to nothing in its disc or on its sphere, if it does."""
     share = shrunk(surface.flattening)
     if share <= MUCH:
         return None
-    name = surface.original.name
-    return Remark(
-        "deep", f"'{name}' is deep, {share:.0%} of it has hardly any room in a disc: cut out what is to be matched"
-    )
+    where = "on a sphere" if surface.flattening.domain.closed else "in a disc"
+    said = f"'{surface.original.name}' is deep, {share:.0%} of it has hardly any room {where}"
+    return Remark("deep", f"{said}: cut out what is to be matched")
 
 
 def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Remark, ...]:
@@ -90,10 +89,10 @@ def _of_surface(surface: Surface) -> list[Remark]:
     for done, (kind, text) in MENDED.items():
         if any(done in said for said in surface.cleaned.changes):
             result.append(Remark(kind, f"'{name}' {text}"))
-    if surface.mesh is not surface.cleaned.mesh:
-        result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     if surface.flattening.rim_lost > LITTLE:
         result.append(Remark("narrow", f"'{name}' is long and narrow: cut it into shorter pieces"))
     elif (cause := deep(surface)) is not None:
         result.append(cause)
+    if surface.mesh is not surface.cleaned.mesh:
+        result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     return result

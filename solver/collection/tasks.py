@@ -31,7 +31,7 @@ KEPT = 24
 """Prepared surfaces that a process keeps in memory: some 3 MB each, of 10,000 triangles."""
 
 Result = dict[str, Any]
-"""Plain data: what a task found, or "error", why it found nothing."""
+"""Plain data: what a task found, or "error", why it found nothing, and "again", if that is no fault of the surfaces."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,12 @@ def run(task: dict[str, Any]) -> Result:
     }
     try:
         return work[task["kind"]](**task["given"])
-    except (MeshError, OSError, ValueError) as error:
+    except (MeshError, ValueError) as error:
         return {"error": str(error) or type(error).__name__}
+    except OSError as error:
+        return {"error": str(error) or type(error).__name__, "again": True}
     except MemoryError:
-        return {"error": "there is not enough memory for it"}
+        return {"error": "there is not enough memory for it", "again": True}
     except Exception as error:  # a fault of the program: named, and the others go on
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{type(error).__name__} in {Path(where.filename).name}, line {where.lineno}: {error}"}

@@ -64,7 +64,7 @@ class Work:
         new: list[Edge] = []
         for edge in edges:
             line = known.get((names[edge[0]], names[edge[1]], asked))
-            if line is None or self._map_is_missing(line):
+            if line is None or line.get("again") or self._map_is_missing(line):
                 new.append(edge)
             else:
                 self._take(edge, line, found)

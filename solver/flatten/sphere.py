@@ -29,7 +29,7 @@ from .flatten import Flattening
 from .harmonic import riemann_map
 from .injective import untangled
 from .locate import TriangulatedDisc
-from .sphere_injective import require_injective, untangled_sphere
+from .sphere_injective import require_injective, require_room, untangled_sphere
 
 FAR_POINTS = 6
 """Points far from each other, from which on the whole the fattest place is least far: the ends of what juts out."""
@@ -123,7 +123,8 @@ def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
     Raises
     ------
     MeshError
-        The mesh is no sphere, or has parts that shrink so much on it that numbers cannot tell their triangles apart.
+        The mesh is no sphere, or has parts that shrink so much on it that numbers cannot tell their triangles apart,
+        or that nothing can be matched there.
 
     Examples
     --------
@@ -145,6 +146,7 @@ def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
         if not spherical_distortion(mesh, sphere).flips:
             break
     require_injective(mesh, sphere)
+    require_room(mesh, sphere)
     sphere[~mesh.used] = np.nan
     return SphereFlattening(mesh, sphere, before)
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from ..mobius import Mobius
 from ..stages import SearchProgress
-from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.mesh import Booleans, Complexes, Floats, Integers
 from .kernels import kernels_for
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
 from .matching import matching
@@ -162,6 +162,9 @@ class Search:
     """The state of one search: the best transformation so far, and the cells that may hold a better one."""
 
     identity: Any = Mobius()
+    bound_at, half_at = BOUND, HALF
+    """Columns of a cell's bound and half side."""
+    at_once = CELLS_AT_ONCE
 
     def __init__(self, z_max: float, limit: float, until: Callable[[float, float, int], bool]) -> None:
         self.z_max, self.until = z_max, until
@@ -194,7 +197,7 @@ class Search:
     @property
     def upper_bound(self) -> float:
         """What no transformation exceeds."""
-        tops = [open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier]
+        tops = [open_[:, self.bound_at].max(initial=-np.inf) for open_ in self.frontier]
         return float(max(self.least, self.unlooked, self.finished_bound, *tops))
 
     def progress(self, seconds: float) -> SearchProgress:
@@ -270,11 +273,11 @@ class Search:
 
     def _round(self, budget: int, pool: ThreadPoolExecutor | None) -> None:
         """Take the best open cells off the frontier, search in each for a while, and put back what is left of them."""
-        bounds = np.concatenate([open_[:, BOUND] for open_ in self.frontier])
+        bounds = np.concatenate([open_[:, self.bound_at] for open_ in self.frontier])
         full = len(bounds) > FRONTIER
-        rank = np.concatenate([open_[:, HALF] for open_ in self.frontier]) if full else -bounds
+        rank = np.concatenate([open_[:, self.half_at] for open_ in self.frontier]) if full else -bounds
         taken = np.zeros(len(bounds), bool)
-        count = min(CELLS_AT_ONCE, len(bounds))
+        count = min(self.at_once, len(bounds))
         taken[np.argpartition(rank, count - 1)[:count]] = True
         first = 0
         for side, open_ in enumerate(self.frontier):
@@ -283,7 +286,8 @@ class Search:
             cells = open_[chosen]
             if len(cells) == 0:
                 continue
-            left = self._expanded(side, cells[np.argsort(-cells[:, BOUND], kind="stable")], budget, pool)
+            cells = cells[np.argsort(-cells[:, self.bound_at], kind="stable")]
+            left = self._expanded(side, cells, budget, pool)
             self.frontier[side] = np.concatenate([open_[~chosen], left])
             self._improve(side, left)
         self.close()
@@ -291,22 +295,30 @@ class Search:
     def close(self) -> None:
         """Take off the frontier what cannot hold a better transformation, or is too small to be split."""
         for side, open_ in enumerate(self.frontier):
-            alive = open_[open_[:, BOUND] > self.least]
-            ended = alive[:, HALF] <= SMALLEST_CELL
-            self.finished_bound = max(self.finished_bound, alive[ended, BOUND].max(initial=-np.inf))
+            alive = open_[open_[:, self.bound_at] > self.least]
+            ended = self._settled(alive)
+            self.finished_bound = max(self.finished_bound, alive[ended, self.bound_at].max(initial=-np.inf))
             self.frontier[side] = alive[~ended]
+
+    def _settled(self, cells: Floats) -> Booleans:
+        """Return which cells are not split further: what their bounds leave open is reported as a gap."""
+        return cells[:, self.half_at] <= SMALLEST_CELL
 
     def _expanded(self, side: int, cells: Floats, budget: int, pool: ThreadPoolExecutor | None) -> Floats:
         """Return what is left of cells after splitting each for a while; the threads share the work."""
-        kernels, value = self.kernels[side], self.least
+        kernels, limits = self.kernels[side], self._limits()
         shares = [cells[k::SHARES] for k in range(min(SHARES, len(cells)))]
         begun = time.perf_counter()
         run = pool.map if pool and self.slow else map
-        parts = list(run(lambda share: kernels.expand(share, value, budget), shares))
+        parts = list(run(lambda share: kernels.expand(share, *limits, budget), shares))
         # what is done sooner than it is handed over is not handed over
         self.slow = time.perf_counter() - begun > HANDED_OVER
         self.nodes += sum(spent for _, spent in parts)
         return np.concatenate([left for left, _ in parts])
+
+    def _limits(self) -> tuple[float, ...]:
+        """Return what bounds are held against."""
+        return (self.least,)
 
     def _improve(self, side: int, left: Floats) -> None:
         """Look for a better transformation at the centres of the most promising cells, then around the best of them."""

@@ -69,10 +69,13 @@ def click_on(place: tuple[int, int]) -> Wait:
     over_the_viewport()
 
 
-def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False) -> Any:
-    """Return where the sidebar's button of a command is: move the mouse along and ask at each place."""
+def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False, across: float = 0.5) -> Any:
+    """Return where the sidebar's button of a command is: move the mouse along and ask at each place.
+
+    `across` says where in the rows, from 0 at their left to 1.
+    """
     sidebar = region("UI")
-    x = sidebar.x + (sidebar.width - 24) // 2
+    x = sidebar.x + int((sidebar.width - 24) * across)
     top = screen_height() - (sidebar.y + sidebar.height)
     places = range(top + 30, top + sidebar.height - 5, STEP)
     for y in reversed(places) if upwards else places:

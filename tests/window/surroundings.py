@@ -44,13 +44,13 @@ def steps() -> Wait:
 def example() -> Wait:
     """Load the example by its button, which then stands where Remove Example is."""
     yield 1.0
-    yield from click_on((yield from find("bpy.ops.mobius.load_example")))
+    yield from click_on((yield from find("bpy.ops.mobius.load_example", across=0.75)))
     yield from until(lambda: bpy.context.scene.mobius.target is not None)
     yield from picture("example")
 
 
 def searched(names: tuple[str, str]) -> Wait:
-    """Search for "mobius" with F3, and run what is found."""
+    """Search for "mobius", as F3 does, and run what is found first."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name in names)
     source, target = (bpy.data.objects[name] for name in names)
@@ -60,8 +60,8 @@ def searched(names: tuple[str, str]) -> Wait:
     bpy.context.preferences.addons[PACKAGE].preferences.after_align = "nothing"
     over_the_viewport()
     yield 0.5
-    pointer("key", "F3")
-    yield 1.0
+    bpy.ops.wm.search_menu("INVOKE_DEFAULT")
+    yield 2.0
     pointer("type", "--delay", "60", "mobius")
     yield from picture("search")
     pointer("key", "Return")

@@ -23,6 +23,9 @@ from solver import (
     save_surface,
 )
 from solver.align.cutting import MUCH, shrunk
+from solver.align.diagnosis import deep
+from solver.align.judgement import judge
+from solver.align.prepared import Surface
 from solver.flatten.flatten import flatten
 
 SMALL = AlignSettings(samples=60, targets=400, reflect="never")
@@ -88,6 +91,35 @@ def test_a_person_does_not_go_to_one_disc(data_path: Callable[[str], Path]) -> N
     opened = faces[data["vertices"][faces][:, :, 1].mean(axis=1) > -8.1]
     tidy = cleaned(TriangleMesh(data["vertices"], opened, "Man"), largest_part=True, fill_holes=True)
     assert shrunk(flatten(tidy.mesh, fill_holes=True)) > 2 * MUCH
+
+
+def person(path: Path) -> tuple[TriangleMesh, np.ndarray]:
+    """The skin of a whole body, and which of its vertices are of the head."""
+    data = np.load(path)
+    corner = data["corner"].reshape(-1, 4)
+    skin = corner[data["part"] == data["part"][0]]
+    faces = np.concatenate([skin[:, [0, 1, 2]], skin[:, [0, 2, 3]]])
+    start, number = data["group_start"], list(data["group_names"]).index("head")
+    rows = slice(start[number], start[number + 1])
+    inside = np.zeros(len(data["vertices"]), bool)
+    inside[data["group_vertex"][rows][data["group_weight"][rows] >= 0.5]] = True
+    return TriangleMesh(data["vertices"], faces, path.stem), inside
+
+
+def test_two_people_are_called_too_deep_and_their_heads_are_aligned(data_path: Callable[[str], Path]) -> None:
+    """What is to be done about two whole bodies works: they share their vertices, which is the truth."""
+    (woman, of_woman), (man, of_man) = (person(data_path(f"heads/mpfb_{who}_body.npz")) for who in ("woman", "man"))
+    for body in (woman, man):
+        cause = deep(Surface(body, fill_holes=True, largest_part=True))
+        assert cause is not None
+        assert cause.text.startswith(f"'{body.name}' is deep, 2")
+        assert cause.text.endswith("of it has hardly any room on a sphere: cut out what is to be matched")
+    pieces = prepare(woman, SMALL, within=of_woman), prepare(posed(man, 4), SMALL, within=of_man)
+    alignment = align(*pieces, SMALL)
+    assert judge(alignment).level != "doubtful"
+    found = correspond(alignment)
+    errors = percent(places(found, woman)[found.matched], woman.vertices[found.matched], alignment.source.mesh)
+    assert errors.mean() < 3
 
 
 def test_a_head_goes_to_one_disc(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:

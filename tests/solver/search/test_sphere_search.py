@@ -165,7 +165,7 @@ def test_the_trace_runs_from_nothing_to_the_outcome():
     source, target, radius, weights = weighted()
     found = sphere_search(source, target, radius / 2, weights=weights, most_nodes=30_000, threads=1)
     seconds, nodes, value, bound = np.array([(x.seconds, x.nodes, x.value, x.upper_bound) for x in found.trace]).T
-    assert len(found.trace) > 10
+    assert len(found.trace) >= 4
     assert (np.diff(seconds) >= 0).all()
     assert (np.diff(nodes) >= 0).all()
     assert (np.diff(value) >= 0).all()
