@@ -62,7 +62,7 @@ def render_sheet(
         turns = _turns(pair[0], surfaces, correspondence)
         for row, (obj, surface, turn) in enumerate(zip(pair, surfaces, turns, strict=True)):
             rest = surface.rest.vertices
-            moved = [sum(key_displacement(obj, one[row]) for one in together(names, keys)) for names in chosen]
+            moved = [np.sum([key_displacement(obj, x[row]) for x in together(names, keys)], axis=0) for names in chosen]
             shapes = [rest] + [rest + mirrored(obj, values) for values in moved]
             for column, shape in enumerate(shapes):
                 corner = np.array([left + _WIDTH * column, top - _HEIGHT * (row + 1)])
