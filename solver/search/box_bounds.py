@@ -47,9 +47,12 @@ percent from there to 1 % some 50,000 to 100,000 more.
 minus sum half_i times the derivative's size minus (1 + most) sum half_i^2, as |v| <= k = sum half_i^2 for the quadratic
 part. If that is positive no transformation of the box is asked for; nor if some |a_i| > 1 throughout.
 
-*Rounding.* Coefficients are at most 1, vectors have length 1, sizes stay below 8, and less than 60 operations are done:
-L0, c_i, n, D_i are off by less than 2^-46, whatever the length of m, which is 1 to 2^-52. Both sides of (2) are off by
-less than 2^-43 |L0| + 2^-90; |L0| times `SLACK` = 2^-42 and 2^-90 are taken off the left one.
+*Rounding.* Coefficients are below 2, vectors have length 1, sizes stay below 8, and less than 60 operations are done:
+L0, c_i and |A0 psi|^2 are off by less than 2^-46, whatever the length of m, which is 1 to 2^-52. |A psi| is at least 1
+/ 19 where |h| <= .9, as its largest over its least value is (1 + |h|) / (1 - |h|) and the largest at least 1; so in
+boxes that hold such, n is above 1 / 29 where it is divided by; elsewhere it is only not to be too small, and taken as
+sqrt(|A0 psi|^2 + 2^-44). Both sides of (2) are then off by less than 2^-43 |L0| + 2^-90; |L0| times `SLACK` = 2^-42
+and 2^-90 are taken off the left one.
 """
 
 from __future__ import annotations
@@ -129,7 +132,8 @@ def bounds_of(problem: Matching, boxes: Floats, most: float) -> Floats:
     near = move[:, None] < 0.5 * size
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = (k1[:, :, None] + v1 @ m.T) * np.where(near, 0.5 / size, 0)[:, None]
-        top = size + np.where(near, (move**2)[:, None] / (2 * (size - move[:, None])), move[:, None])
+        rest = np.where(near, (move**2)[:, None] / (2 * (size - move[:, None])), move[:, None])
+    top = np.sqrt(size**2 + 2.0**-44) + rest
     growth = np.where(near[:, None], growth, 0)
     off = a @ pair.T
     length = np.abs(off)

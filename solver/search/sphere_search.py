@@ -23,7 +23,7 @@ from ..surface.mesh import Booleans, Floats
 from .box_bounds import place_of, transformation
 from .branch_and_bound import FRONTIER, SMALLEST_CELL, Search, require_ends
 from .kernels.box_kernels import box_kernels_for
-from .kernels.boxes import BOUND, LARGEST, MIDDLE, SIDES, coefficients, points, whole_group
+from .kernels.boxes import BOUND, COLUMNS, LARGEST, MIDDLE, SIDES, coefficients, points, whole_group
 from .outcome import SearchResult
 from .sphere_matching import MOST_H, SphereMatching, sphere_matching
 from .sphere_rotations import Rotations, never
@@ -35,7 +35,7 @@ _IDENTITY = SphereMobius()
 FIRST_STEP, LAST_STEP = 0.1, 1e-4
 """Of the climb from the best rotation: coefficients of matrices, half an angle or h."""
 
-AT_ONCE = 256
+AT_ONCE = 1024
 """Open boxes taken on in one round of all transformations."""
 
 LOOKED_AT = 128
@@ -211,7 +211,7 @@ class _SphereSearch(Search):
         if self.z_max == 0 or self.out_of_time:
             return
         self.kernels = [box_kernels_for(side, self.z_max, SMALLEST_CELL, self.halt) for side in self.sides]
-        self.frontier = [whole_group(side.limit) for side in self.sides]
+        self.frontier = [whole_group(x.limit, y.width) for x, y in zip(self.sides, self.kernels, strict=True)]
         self.unlooked = -np.inf
         self._climb(self.best_side, place_of(self._plain(self.best)), self.value, FIRST_STEP)
         for side, problem in enumerate(self.sides):
@@ -263,7 +263,7 @@ class _SphereSearch(Search):
         chosen = left[np.argsort(-left[:, BOUND], kind="stable")[:LOOKED_AT]]
         if len(chosen) == 0:
             return
-        middles = chosen.copy()
+        middles = chosen[:, :COLUMNS].copy()
         middles[:, SIDES] = 0
         low = 2 * self.value - self.upper_bound  # as far below as the bound is above
         self._look(side, middles, float(chosen[:, LARGEST].max()), low if self.climbed < CLIMBED * self.nodes else None)

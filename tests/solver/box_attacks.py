@@ -69,7 +69,9 @@ def attack(
             start, low = boxes[k : k + 1], float(value[k]) * 0.999
             counts[f"WRONG {name}, told a value"] += int(kernels.bounds(start, low)[0] < value[k])
             enough = low * float(rng.choice([1, 1.2, 3]))
-            left, _ = kernels.expand(start, low, enough, int(rng.integers(8, 200)))
+            rows = np.concatenate([start, np.zeros((1, kernels.width - start.shape[1]))], axis=1)
+            left, _ = kernels.expand(rows, low, enough, int(rng.integers(1, 200)))
+            left, _ = kernels.expand(left, low, low, int(rng.integers(1, 50)))  # with what the first has left in them
             counts[f"subtrees, {name}"] += 1
             good = [box for box in left if box[BOUND] >= value[k]]
             counts[f"WRONG {name}, subtree"] += not any(holds(box, known[k]) for box in good)

@@ -14,7 +14,7 @@ from ..box_bounds import BOXES_AT_ONCE, bounds_of, caps_of, pair_coefficients
 from ..matching import Matching
 from ..pairs import MOST_PAIRS, too_many
 from ..watch import Halt, look
-from .boxes import BOUND, LARGEST, MIDDLE, SIDES, new_boxes
+from .boxes import BOUND, COLUMNS, LARGEST, MIDDLE, SIDES
 from .compiled import library
 
 LANES = 4
@@ -25,6 +25,9 @@ STACK = 512
 
 MOST_HELD = 1 << 22
 """Pairs whose coefficients are kept, 72 bytes each; of more they are computed whenever they are looked at."""
+
+MOST_KNOWN = 256
+"""Source points of which a box keeps which pairs need not be looked at, a byte each."""
 
 ARENA = 1 << 20
 """Entries of lists that one thread can hold for the boxes it has open, 8 bytes each, or 32 for every source point."""
@@ -48,7 +51,13 @@ def most_of(h_max: float) -> float:
 
 
 class CompiledBoxKernels:
-    """The kernels for one matching, in C; see `ReferenceBoxKernels` for the same in numpy."""
+    """The kernels for one matching, in C; see `ReferenceBoxKernels` for the same in numpy.
+
+    Attributes
+    ----------
+    width : int
+        Columns of the rows that `expand` takes and returns.
+    """
 
     name = "compiled"
 
@@ -68,6 +77,7 @@ class CompiledBoxKernels:
         self._arrays = {name: None if x is None else np.ascontiguousarray(x) for name, x in arrays.items()}
         addresses = {name: None if x is None else x.ctypes.data for name, x in self._arrays.items()}
         self._problem = _Problem(points=self.points, most=most_of(h_max), smallest=smallest, **addresses)
+        self.width = COLUMNS + -(-min(self.points, MOST_KNOWN) // 8)
         self._room = max(ARENA, 32 * self.points)
         self._local = threading.local()
         look(self.halt)
@@ -87,7 +97,7 @@ class CompiledBoxKernels:
 
         Below 0: not above `value`, or no transformation is in the box.
         """
-        given = np.array(boxes, dtype=np.float64, order="C")
+        given = np.array(boxes[:, :COLUMNS], dtype=np.float64, order="C")
         least = max(value / self.unit, -0.5)
         self._library.boxes_bounds(ctypes.addressof(self._problem), given.ctypes.data, len(given), least, self._arena())
         return given[:, BOUND] * self.unit
@@ -96,18 +106,19 @@ class CompiledBoxKernels:
         """Return what is left of boxes after searching each, depth first, for `budget` bounds, and how many it took.
 
         Those whose bound is at most `value` are gone, those whose bound is at most `enough` are left as they are. If
-        halted, the rest are.
+        halted, the rest are. Columns beyond those of a box are the kernels' own, 0 at first.
         """
         given = np.array(boxes, dtype=np.float64, order="C")
         given[:, BOUND] /= self.unit
         counts = np.zeros(2, np.int64)
-        room = new_boxes(2 * (budget + STACK))
+        room = np.empty((2 * (budget + STACK), self.width))
         parts, spent = [], 0
         while len(given):
             done = self._library.boxes_expand(
                 ctypes.addressof(self._problem),
                 given.ctypes.data,
                 len(given),
+                self.width,
                 value / self.unit,
                 enough / self.unit,
                 budget,
@@ -123,7 +134,7 @@ class CompiledBoxKernels:
             if self.halt[0]:
                 parts.append(given)
                 break
-        left = np.concatenate(parts) if parts else new_boxes(0)
+        left = np.concatenate(parts) if parts else given
         left[:, BOUND] *= self.unit
         return left, spent
 
@@ -166,6 +177,7 @@ class ReferenceBoxKernels:
     """The kernels for one matching, in numpy."""
 
     name = "numpy"
+    width = COLUMNS
 
     def __init__(self, problem: Matching, h_max: float, smallest: float, halt: Halt | None = None) -> None:
         self.problem, self.h_max, self.smallest = problem, h_max, smallest

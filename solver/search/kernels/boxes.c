@@ -47,7 +47,9 @@ typedef struct {
     double face;            /* which is 1 */
     double largest;         /* half side */
     double bound;           /* nothing here is worth more */
-} Box;
+} Box;                      /* followed by the blocks of pairs that need not be looked at, a byte for each of the first points */
+
+#define COLUMNS (sizeof(Box) / sizeof(double))
 
 typedef struct { uint32_t point, pair; } Live; /* a source point, and the heaviest of its pairs that may be matched */
 
@@ -150,11 +152,12 @@ static double bound_of(const Problem *p, const Box *box, Query *q) {
         uint32_t j = q->parents[t].point, first = q->parents[t].pair;
         const double *m = p->source + 3 * j;
         double square = k0 + v0[0] * m[0] + v0[1] * m[1] + v0[2] * m[2];
-        double size = __builtin_sqrt(square > 0 ? square : 0), top = size + move, growth[6] = {0};
+        double size = __builtin_sqrt(square > 0 ? square : 0), growth[6] = {0};
+        double top = __builtin_sqrt((square > 0 ? square : 0) + 0x1p-44) + move;
         if (move < 0.5 * size) {
             double over = 0.5 / size;
             for (int i = 0; i < 6; i++) growth[i] = (k1[i] + v1[i][0] * m[0] + v1[i][1] * m[1] + v1[i][2] * m[2]) * over;
-            top = size + move * move / (2 * (size - move));
+            top += move * move / (2 * (size - move)) - move;
         }
         int64_t found = -1, stop = p->stop[j];
         int inside = 0;
@@ -195,17 +198,32 @@ static double bound_of(const Problem *p, const Box *box, Query *q) {
     return (double)total;
 }
 
-static int64_t everything(const Problem *p, Live *list) {
+/* All source points with the first of their pairs, but for those that are dead by `skipped`. */
+static int64_t everything(const Problem *p, const uint8_t *skipped, int64_t known, Live *list) {
     int64_t count = 0;
-    for (int64_t j = 0; j < p->points; j++)
-        if (p->stop[j] > p->start[j]) list[count++] = (Live){(uint32_t)j, (uint32_t)p->start[j]};
+    for (int64_t j = 0; j < p->points; j++) {
+        int64_t first = p->start[j] + (j < known ? LANES * (int64_t)skipped[j] : 0);
+        if (first < p->stop[j]) list[count++] = (Live){(uint32_t)j, (uint32_t)first};
+    }
     return count;
+}
+
+/* Put a box and what is known of its list among those left; of points that are in no list, what was known before. */
+static void leave(const Problem *p, const Box *box, const Live *list, int64_t count, const uint8_t *before, int64_t known,
+                  double *left) {
+    uint8_t *skipped = (uint8_t *)(left + COLUMNS);
+    __builtin_memcpy(left, box, sizeof(Box));
+    for (int64_t j = 0; j < known; j++) skipped[j] = before[j];
+    for (int64_t i = 0; i < count && list[i].point < known; i++) {
+        int64_t blocks = (list[i].pair - p->start[list[i].point]) / LANES;
+        skipped[list[i].point] = blocks < 255 ? (uint8_t)blocks : 255;
+    }
 }
 
 /* Write the bound of each box into it, -1 where it is not above `value` or no transformation is in the box. `arena`: N1
    entries. */
 EXPORT void boxes_bounds(const Problem *p, Box *boxes, int64_t n, double value, Live *arena) {
-    int64_t count = everything(p, arena);
+    int64_t count = everything(p, 0, 0, arena);
     for (int64_t i = 0; i < n; i++) {
         Query query = {value, arena, count, 0, 0, 0, 0, {0}};
         boxes[i].bound = bound_of(p, &boxes[i], &query);
@@ -231,30 +249,34 @@ static void halve(const Box *box, const double slope[6], Box halves[2]) {
 typedef struct { Box box; int64_t offset, count, settled; } Open; /* list of points and pairs */
 
 /* Search the subtrees of `boxes` depth first for boxes whose bound exceeds `value`, at most `budget` bounds each; what is left
-   open goes to `left`, and so do those whose bound is at most `enough`. Returns how many of `boxes` were taken on (all, unless
-   `left` might overflow, or halted). counts: boxes left, bounds computed. */
-EXPORT int64_t boxes_expand(const Problem *p, const Box *boxes, int64_t n, double value, double enough, int64_t budget, Box *left,
-                            int64_t left_room, int64_t *counts, Live *arena, int64_t room) {
+   open goes to `left`, and so do those whose bound is at most `enough`. `stride`: numbers from one box to the next. Returns how
+   many of `boxes` were taken on (all, unless `left` might overflow, or halted). counts: boxes left, bounds computed. */
+EXPORT int64_t boxes_expand(const Problem *p, const double *boxes, int64_t n, int64_t stride, double value, double enough,
+                            int64_t budget, double *left, int64_t left_room, int64_t *counts, Live *arena, int64_t room) {
     Open stack[STACK];
-    int64_t done = 0, bounds = 0, found = 0, first = everything(p, arena);
+    int64_t done = 0, bounds = 0, found = 0, known = (stride - (int64_t)COLUMNS) * (int64_t)sizeof(double);
+    if (known > p->points) known = p->points;
     for (; done < n && found + budget + STACK <= left_room && !*p->halt; done++) {
+        const uint8_t *before = (const uint8_t *)(boxes + stride * done + COLUMNS);
         int64_t depth = 1, spent = 0;
-        stack[0] = (Open){boxes[done], 0, first, 0};
+        __builtin_memcpy(&stack[0].box, boxes + stride * done, sizeof(Box));
+        stack[0].offset = stack[0].settled = 0;
+        stack[0].count = everything(p, before, known, arena);
         while (depth) {
             Open open = stack[--depth];
             int64_t top = open.offset + open.count;
-            if (spent >= budget || top + open.count > room || *p->halt) {
-                left[found++] = open.box;
+            int over = spent >= budget || top + open.count > room || *p->halt;
+            Query query = {value, arena + open.offset, open.count, open.settled, arena + top, 0, 0, {0}};
+            double bound = over ? -2 : bound_of(p, &open.box, &query);
+            if (bound == -2) {
+                leave(p, &open.box, arena + open.offset, open.count, before, known, left + stride * found++);
                 continue;
             }
-            Query query = {value, arena + open.offset, open.count, open.settled, arena + top, 0, 0, {0}};
-            double bound = bound_of(p, &open.box, &query);
-            if (bound == -2) { left[found++] = open.box; continue; }
             bounds++; spent++;
             if (bound < 0) continue;
             if (bound < open.box.bound) open.box.bound = bound;
             if (open.box.bound <= enough || open.box.largest <= p->smallest || depth + 2 > STACK) {
-                left[found++] = open.box;
+                leave(p, &open.box, arena + top, query.kept, before, known, left + stride * found++);
                 continue;
             }
             Box halves[2];

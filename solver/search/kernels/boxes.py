@@ -9,6 +9,8 @@ from ...surface.mesh import Floats, Integers
 FACE, LARGEST, BOUND = 12, 13, 14
 """Columns: which coefficient is 1, the largest half side, a bound on Q."""
 
+COLUMNS = 15
+
 MIDDLE, SIDES = slice(0, 6), slice(6, 12)
 """Columns: middle and half sides, real and imaginary parts of the coefficients that are not 1, in their order."""
 
@@ -18,7 +20,7 @@ FREE = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 def new_boxes(count: int) -> Floats:
     """Return rows of zeros, (count, 15)."""
-    return np.zeros((count, 15))
+    return np.zeros((count, COLUMNS))
 
 
 def turning(face: Integers) -> np.ndarray:
@@ -27,9 +29,9 @@ def turning(face: Integers) -> np.ndarray:
     return np.stack([other, ~other], axis=2).reshape(-1, 6)
 
 
-def whole_group(bound: float) -> Floats:
-    """Return the four rows that hold every transformation."""
-    boxes = new_boxes(4)
+def whole_group(bound: float, width: int = COLUMNS) -> Floats:
+    """Return the four rows that hold every transformation, (4, width)."""
+    boxes = np.zeros((4, width))
     boxes[:, SIDES], boxes[:, FACE], boxes[:, LARGEST], boxes[:, BOUND] = 1, range(4), 1, bound
     return boxes
 

@@ -101,7 +101,8 @@ def opened(path: Path) -> ctypes.CDLL:
     loaded.sphere_images_of.argtypes = [_I64, *[_POINTER] * 8]
     loaded.boxes_bounds.restype, loaded.boxes_expand.restype = None, _I64
     loaded.boxes_bounds.argtypes = [_POINTER, _POINTER, _I64, _F64, _POINTER]
-    loaded.boxes_expand.argtypes = [_POINTER, _POINTER, _I64, _F64, _F64, _I64, _POINTER, _I64, *[_POINTER] * 2, _I64]
+    expansion = [_POINTER, _POINTER, _I64, _I64, _F64, _F64, _I64, _POINTER, _I64, _POINTER, _POINTER, _I64]
+    loaded.boxes_expand.argtypes = expansion
     return loaded
 
 
