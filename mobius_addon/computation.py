@@ -16,7 +16,10 @@ from ..solver import (
     Cleaned,
     Correspondence,
     Flattening,
+    MeshError,
     Progress,
+    SphereFlattening,
+    Surface,
     TriangleMesh,
     align,
     cleaned,
@@ -102,6 +105,16 @@ def flattened(
     vertex = None if outer is None else tidy.vertex_for(outer)
     found = flatten(tidy.mesh, method, fill_holes=repair.fill_holes, outer_vertex=vertex)
     return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found), *_layout_notes(found)))
+
+
+def on_sphere(mesh: TriangleMesh, repair: Repair, keys: Floats | None = None) -> tuple[SphereFlattening, Cleaned]:
+    """Return the map of a closed mesh, put in order, to the unit sphere; see `solver.flatten_sphere`."""
+    surface = Surface(mesh, fill_holes=repair.fill_holes, largest_part=repair.largest_part, keys=keys)
+    if (surface.cleaned.mesh.twins < 0).any():
+        raise MeshError(f"'{mesh.name}' has a boundary: only what is closed goes to a sphere")
+    flat = surface.flattening
+    assert isinstance(flat, SphereFlattening)
+    return flat, surface.cleaned
 
 
 def _layout_notes(found: Flattening) -> tuple[str, ...]:

@@ -82,8 +82,8 @@ def _edits(found: Topology, line: Line, *, has_seams: bool) -> tuple[str, ...]:
     """Return what may mend a mesh of this topology; nothing of a clean one."""
     troubled = not line.is_disc or line.selectable
     fitting = {
-        "fill": len(found.boundary_loops) > 1,
         "largest": found.parts > 1,
+        "fill": found.parts == 1 and len(found.boundary_loops) > 1,
         "inner": len(found.non_manifold_edges) > 0,
         "cut": has_seams and (not line.is_disc or not found.boundary_loops),
         "normals": len(found.inconsistent_edges) > 0,

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import struct
 import subprocess
 import tomllib
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ OPENS_FILES = {
     "mobius_addon/textures/images.py",
     "solver/collection/folder.py",
     "solver/collection/tasks.py",
+    "solver/collection/work.py",
 }
 WORKER = "solver/collection/worker.py"  # in processes of its own, which have to find the extension
 KNOWS_ITS_PLACE = {"mobius_addon/preset_menus.py", "mobius_addon/operators/example.py"}  # presets, the guide
@@ -130,3 +132,12 @@ def test_no_file_is_large_or_of_a_kind_that_nobody_can_read() -> None:
     assert max(sizes.values()) < 200_000, max(sizes, key=lambda name: sizes[name])
     assert sum(sizes.values()) < 3_000_000
     assert {Path(name).suffix for name in sizes} <= {".py", ".c", ".html", ".png"}
+
+
+def test_the_icon_is_what_the_platform_takes_and_stays_out_of_the_zip() -> None:
+    """It is uploaded beside the zip: a square PNG of 256 texels, transparent around. `release.icon` draws it."""
+    data = (ROOT / "docs/icon.png").read_bytes()
+    kind, width, height, bits, color = struct.unpack(">4sIIBB", data[12:26])
+    assert (data[:8], kind, width, height, bits, color) == (b"\x89PNG\r\n\x1a\n", b"IHDR", 256, 256, 8, 6)
+    assert "/docs/*" in MANIFEST["build"]["paths_exclude_pattern"]
+    assert "!/docs/icon.png" not in MANIFEST["build"]["paths_exclude_pattern"]

@@ -89,6 +89,13 @@ def structure_of(mesh: bpy.types.Mesh) -> str | None:
     return said.get("points", {}).get(STRUCTURE) or said.get("file", {}).get(STRUCTURE)
 
 
+def is_sphere(mesh: bpy.types.Mesh) -> None:
+    """Say of a mesh that came out of such a file that it lies on a sphere now."""
+    if PROPERTY in mesh:
+        said = said_of(mesh)
+        mesh[PROPERTY] = json.dumps(said | {"points": said.get("points", {}) | {"GeometricType": "Spherical"}})
+
+
 def lies_where(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> None:
     """Say of a mesh what is said of another one, in whose shape and place it is."""
     mesh.pop(PROPERTY, None)

@@ -40,5 +40,7 @@ class MOBIUS_PT_pictures(AlignedPanel, bpy.types.Panel):
             row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
         layout.prop(view, "legend")
         if (kept := preferences(context)) is not None:
-            layout.prop(kept, "after_align")
+            column = layout.column(align=True)
+            column.label(text="After Align")
+            column.prop(kept, "after_align", text="")
         layout.operator(MOBIUS_OT_clear.bl_idname, icon="TRASH")

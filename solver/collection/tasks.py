@@ -28,7 +28,7 @@ from .distance import EvenFlow
 from .pair import figures
 
 KEPT = 24
-"""Prepared surfaces that a process keeps in memory: some 3 MB each, of 10,000 triangles."""
+"""Prepared surfaces that a process keeps in memory: 13 MB each, of 10,000 triangles (`tests/bench/growth.py`)."""
 
 Result = dict[str, Any]
 """Plain data: what a task found, or "error", why it found nothing, and "again", if that is no fault of the surfaces."""

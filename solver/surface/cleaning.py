@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -147,7 +148,12 @@ class _Work:
 
     @property
     def areas(self) -> Floats:
-        return self.mesh.face_areas[self.kept]
+        return self.calm.face_areas[self.kept]
+
+    @cached_property
+    def calm(self) -> TriangleMesh:
+        """The mesh without spikes, the faces of which would outweigh all others."""
+        return without_spikes(self.mesh)[0]
 
     def _keep(self, chosen: Booleans) -> None:
         self.kept, self.faces, self.turned = self.kept[chosen], self.faces[chosen], self.turned[chosen]
@@ -183,8 +189,13 @@ class _Work:
         joints = coinciding(self.mesh.vertices, self.faces, apart, keys)
         if not joints.left.size or self._closed_by(joints, apart):
             return apart
-        self.changes.append(f"{plural(len(joints.left), 'edge')} joined along which it is cut open")
-        return apart.with_others(joints)
+        joined, glue = len(joints.left), apart.with_others(joints)
+        while not joints.opposed.all():  # parts that now face one side may touch along more
+            glue = self._turned_to(glue)
+            joints = coinciding(self.mesh.vertices, self.faces, glue, keys)
+            joined, glue = joined + len(joints.left), glue.with_others(joints)
+        self.changes.append(f"{plural(joined, 'edge')} joined along which it is cut open")
+        return glue
 
     def _require_manifold(self, edge: Integers) -> None:
         """Raise if edges of three or more faces are left in what will be kept."""

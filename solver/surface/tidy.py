@@ -80,18 +80,37 @@ class Cleaned:
         )
 
     def without_pinholes(self) -> Cleaned:
-        """Return it with a face in each opening of three edges, but for the longest boundary."""
+        """Return it with a face in each opening of three edges, but for the longest boundary.
+
+        What hangs on the surface by three edges about such a face, as what is left of a tube that was cut through does,
+        gives way to one.
+        """
         mesh = self.mesh
         loops = pinholes(mesh)
         if not len(loops):
             return self
         said = f"{plural(len(loops), 'missing triangle')} put in"
-        return replace(
+        whole = replace(
             self,
             mesh=TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, loops]), mesh.name),
             faces=np.concatenate([self.faces, np.full(len(loops), -1)]),
             reversed=np.concatenate([self.reversed, np.zeros(len(loops), bool)]),
             changes=(*self.changes, said),
+        )
+        kept, feet = _without_stubs(whole.mesh, loops)
+        if not len(feet):
+            return whole
+        gone = whole.mesh.faces[~kept]
+        faces = np.concatenate([whole.mesh.faces[kept], feet])
+        used = np.zeros(len(mesh.vertices), bool)
+        used[faces] = True
+        lost = np.setdiff1d(gone, np.flatnonzero(used))
+        return replace(
+            whole,
+            mesh=TriangleMesh(mesh.vertices, faces, mesh.name),
+            faces=np.concatenate([whole.faces[kept], np.full(len(feet), -1)]),
+            reversed=np.concatenate([whole.reversed[kept], np.zeros(len(feet), bool)]),
+            vertex_of=np.where(np.isin(self.vertex_of, lost), -1, self.vertex_of),
         )
 
     @property
@@ -188,6 +207,27 @@ def _cut_open(tidy: Cleaned, edges: Integers) -> Cleaned:
     largest = area.argmax()
     share = area[largest] / mesh.area
     return opened.only(part == largest, f"to a piece of {share:.1%} of its area; the rest has no counterpart")
+
+
+def _without_stubs(mesh: TriangleMesh, caps: Integers) -> tuple[Booleans, Integers]:
+    """Return which faces, (m,), are not about one of some faces and hang on the rest by three edges; and these, (k, 3).
+
+    None where a vertex of the cap is one of the three edges'.
+    """
+    kept, feet = np.ones(len(mesh.faces), bool), []
+    ends = directed_edges(mesh.faces)
+    for cap in caps:
+        stub = np.isin(mesh.faces, cap).any(axis=1)
+        sides = np.flatnonzero(np.repeat(stub, 3))
+        out = sides[(mesh.twins[sides] < 0) | ~stub[mesh.twins[sides] // 3]]
+        start, stop = ends[out].T
+        ring = len(out) == 3 and (mesh.twins[out] >= 0).all() and set(start.tolist()) == set(stop.tolist())
+        if ring and kept[stub].all() and not np.isin(start, cap).any():
+            kept[stub] = False
+            first = start[0]
+            second = stop[0]
+            feet.append([first, second, stop[start == second][0]])
+    return kept, np.array(feet, np.intp).reshape(-1, 3)
 
 
 def pinholes(mesh: TriangleMesh) -> Integers:

@@ -124,3 +124,14 @@ def test_nothing_is_done_to_what_cannot_be_edited() -> None:
         bpy.ops.mobius.mend(object_name=obj.name, how="largest")
     assert len(obj.data.vertices) == before
     assert {x.identifier for x in REMEDIES} == {"fill", "join", "largest", "inner", "cut", "normals", "flip"}
+
+
+def test_what_is_in_the_way_is_told_from_what_is_mended_anyway() -> None:
+    obj = sheet(lambda i, j: j != 3)
+    settings = bpy.context.scene.mobius
+    assert line_of(obj, repair(settings)).is_disc
+    settings.largest_part = False
+    line = line_of(obj, repair(settings))
+    assert (line.is_disc, line.remedy, line.edits[0]) == (False, "largest_part", "largest")
+    assert mend(obj, "largest") == {"FINISHED"}
+    assert line_of(obj, repair(settings)).is_disc

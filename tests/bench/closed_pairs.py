@@ -106,10 +106,15 @@ def bones(store: Store) -> Iterator[Pair]:
         return
     for k, name in enumerate(BONES):
         mesh = _stl(folder / f"{name}.stl")
-        shape, side = _called(bent(mesh, k), f"{name}, bent"), 1
-        if k % 3 == 2:
-            shape, side = mirrored(shape), -1
-        yield next(_both_ways("bones", Shape(mesh), Shape(shape, handedness=side), store, 40 + k))
+        found = next(_both_ways("bones", Shape(mesh), Shape(_called(bent(mesh, k), f"{name}, bent")), store, 40 + k))
+        yield _of_the_other_hand(found) if k % 3 == 2 else found
+
+
+def _of_the_other_hand(given: Pair) -> Pair:
+    """Return the pair with the target mirrored; its faces, and with them the corners of places, run the other way."""
+    known = given.known
+    places = Places(known.face, known.barycentric[:, ::-1], known.truth)
+    return replace(given, target=mirrored(given.target), surface=places, reflected=True)
 
 
 def teeth(store: Store) -> Iterator[Pair]:

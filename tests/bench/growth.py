@@ -22,7 +22,9 @@ import numpy as np
 import psutil
 
 from solver import AlignSettings, TriangleMesh
+from solver.align.surface_file import load_surface
 from solver.collection import Collection, Plan, Specimen, Told, collect, processes
+from solver.collection.chart import Chart
 from solver.collection.cluster import Cluster
 from solver.collection.engine import Open
 
@@ -194,7 +196,14 @@ def kept(root: Path, vertices: int = 5000, count: int = 12) -> None:
         assert "error" not in result, result
         held.append(resident(here))
     each = np.polyfit(np.arange(len(held) - 2), held[2:], 1)[0]
-    print(f"a worker keeps {each:.1f} MB of each prepared surface of {len(meshes[0].faces):,} triangles")
+    print(f"a worker keeps {each:.1f} MB of each prepared surface of {len(meshes[0].faces):,} triangles", flush=True)
+    held, charts = [], []
+    for path in paths:
+        charts.append(Chart.of(load_surface(path), 40))
+        charts[-1].places(charts[-1].disc[:100])
+        held.append(resident(here))
+    each = np.polyfit(np.arange(len(held) - 2), held[2:], 1)[0]
+    print(f"an atlas keeps {each:.1f} MB of each")
 
 
 def main() -> None:

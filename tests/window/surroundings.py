@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import hand
-from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, until
+from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, undo, until
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
@@ -32,11 +32,11 @@ def steps() -> Wait:
     yield from searched(names)
     assert bpy.ops.mobius.align("EXEC_DEFAULT", True, **QUICK) == {"FINISHED"}
     bpy.ops.mobius.heat_map("EXEC_DEFAULT", True, measure="confidence")
-    yield from looks(names)
-    yield from modes(names)
     yield from second_window(names)
-    yield from mended()
+    yield from mended(names)
     yield from linked(names)
+    yield from modes(names)
+    yield from looks(names)
     yield from large(names)
     print("[clicks] done", flush=True)
 
@@ -50,7 +50,7 @@ def example() -> Wait:
 
 
 def searched(names: tuple[str, str]) -> Wait:
-    """Search for "mobius", as F3 does, and run what is found first."""
+    """Search for "map mobius", as F3 does, and run what is found; a collection may be called Mobius too."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name in names)
     source, target = (bpy.data.objects[name] for name in names)
@@ -62,7 +62,7 @@ def searched(names: tuple[str, str]) -> Wait:
     yield 0.5
     bpy.ops.wm.search_menu("INVOKE_DEFAULT")
     yield 2.0
-    pointer("type", "--delay", "60", "mobius")
+    pointer("type", "--delay", "60", "map mobius")
     yield from picture("search")
     pointer("key", "Return")
     yield from until(lambda: Job.current is None and bool(target.data.mobius_transferred))
@@ -89,9 +89,10 @@ def looks(names: tuple[str, str]) -> Wait:
     yield 1.0
     sidebar = region("UI")
     before = sidebar.width
-    for beside in (-3, 8, 3, 0, -6):  # where its edge can be gripped differs between versions
+    for beside in 3 * (-3, 8, 3, 0, -6):  # where its edge can be gripped differs between versions
         left, y = sidebar.x + beside, screen_height() - (sidebar.y + sidebar.height - 60)
         yield drag(left, y, left + 90, y)
+        yield 1.0
         if region("UI").width != before:
             break
     print(f"[clicks] sidebar {before} -> {region('UI').width} pixels wide", flush=True)
@@ -145,23 +146,30 @@ def second_window(names: tuple[str, str]) -> Wait:
     yield 1.0
 
 
-def mended() -> Wait:
+def mended(names: tuple[str, str]) -> Wait:
     """A mesh that cannot be used says why, and a button beside it mends it."""
-    bpy.ops.mesh.primitive_torus_add()
-    ring = bpy.context.object
-    bpy.ops.mesh.primitive_uv_sphere_add(location=(4, 0, 0))
-    for obj in (ring, bpy.context.object):
-        obj.select_set(True)
-    bpy.context.view_layer.objects.active = ring
+    settings = bpy.context.scene.mobius
+    settings.largest_part = False
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=(0, 0, 3))
+    balls = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, location=(3, 0, 3))
+    balls.select_set(True)
+    bpy.context.view_layer.objects.active = balls
     bpy.ops.object.join()
-    before = len(ring.data.vertices)
-    bpy.context.scene.mobius.target = ring
+    name, before = balls.name, len(balls.data.vertices)
+    settings.target = balls
+    bpy.ops.ed.undo_push(message="two parts")
     yield from picture("in-the-way")
     place = yield from find("bpy.ops.mobius.mend")
     yield from click_on(place)
-    yield from until(lambda: len(ring.data.vertices) < before)
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) < before)
     yield from picture("mended")
-    bpy.data.objects.remove(ring)
+    undo()
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) == before)
+    bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.context.scene.mobius.largest_part = True
+    bpy.context.scene.mobius.target = bpy.data.objects[names[1]]
+    yield 0.5
 
 
 def linked(names: tuple[str, str]) -> Wait:

@@ -167,6 +167,29 @@ def test_the_wrapped_surface_is_where_the_target_is(halves: Path, capsys: pytest
     assert nibabel.load(out).get_arrays_from_intent("pointset")[0].meta[STRUCTURE] == "CortexRight"
 
 
+def test_a_closed_surface_is_written_on_a_sphere(halves: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = halves / "left.sphere.surf.gii"
+    status, said, err = run(capsys, "flatten", halves / "left.surf.gii", "-o", out, "--sphere")
+    assert (status, err) == (0, "")
+    assert "on a sphere of radius 100, angles off by" in said
+    vertices, faces = surface(out)
+    assert (faces == surface(halves / "left.surf.gii")[1]).all()
+    assert np.allclose(np.linalg.norm(vertices, axis=1), 100, atol=1e-3)
+    assert (np.linalg.det(vertices[faces]) > 0).all()
+    meta = nibabel.load(out).get_arrays_from_intent("pointset")[0].meta
+    assert (meta["GeometricType"], meta[STRUCTURE]) == ("Spherical", "CortexLeft")
+    # in a .blend the mesh itself stays as it is
+    assert run(capsys, "flatten", halves / "left.surf.gii", "-o", halves / "out.blend", "--sphere")[0] == 0
+    bpy.ops.wm.open_mainfile(filepath=str(halves / "out.blend"))
+    (name,) = (x for x in bpy.data.objects.keys() if x.endswith("on the sphere"))  # noqa: SIM118
+    assert np.allclose(np.linalg.norm(positions(bpy.data.objects[name]), axis=1), 1, atol=1e-5)
+    assert np.ptp(np.linalg.norm(positions(bpy.data.objects[name.removesuffix(" on the sphere")]), axis=1)) > 0.1
+    (halves / "open.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    status, _, err = run(capsys, "flatten", halves / "open.off", "-o", halves / "never.ply", "--sphere")
+    assert status == 1
+    assert "has a boundary: only what is closed goes to a sphere" in err
+
+
 def test_the_picture_shows_both_spheres_in_one_frame(halves: Path, capsys: pytest.CaptureFixture[str]) -> None:
     picture, pair = halves / "spheres.png", (halves / "left.surf.gii", halves / "right.surf.gii")
     assert run(capsys, "align", *pair, "--picture", halves / "spheres.jpg", *FEW)[0] == 2

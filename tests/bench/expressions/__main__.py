@@ -118,6 +118,8 @@ def draw(pair: str, kept: float, folder: Path, picture: Path) -> None:
     """Draw a pair by the command that people use."""
     head, other = (read_head(DATA / "heads", name) for name in pair.split(":"))
     save_source(head, folder / "source.blend")
+    bpy.data.objects["Head"].rotation_euler.x = np.pi / 2  # in the data y is up
+    bpy.ops.wm.save_mainfile()
     save_target(target_of(other, kept), folder / "target.blend")
     run(folder, "sheet", "--only", "shape-keys", "--sheet", str(picture.resolve()))
 

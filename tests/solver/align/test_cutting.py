@@ -191,4 +191,4 @@ def test_a_cut_surface_is_saved_with_its_seam(tmp_path: Path) -> None:
     again = load_surface(tmp_path / "one.npz")
     assert again.within is not None
     assert np.array_equal(again.within, sewn)
-    assert np.array_equal(again.flattening.disc, one.flattening.disc, equal_nan=True)
+    assert np.array_equal(again.flattening.places, one.flattening.places, equal_nan=True)
