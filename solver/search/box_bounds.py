@@ -38,8 +38,8 @@ probability of 2^(1 - k) sum_{i < 6} binom(k - 1, i) (Wendel 1962), .62 for 11.
 *Rate.* Bounds exceed values by some `slope` times the box's side, so that a gap g near the best transformation needs
 sides of g / slope, in a region where values are less than g below the best: some number of boxes that does not depend
 on g as long as values fall off linearly there, and grows like g^-6 on a plateau. Halving all six sides costs a factor
-of 64; measured on cortices, a head and a brain (100 points, 20,000 pairs): 5 % takes 100,000 to 200,000 boxes, each
-percent from there to 1 % some 50,000 to 100,000 more.
+of 64; measured on cortices, a head and a brain (100 points, 20,000 pairs): 5 % takes 110,000 to 230,000 boxes, each
+percent from there to 1 % some 40,000 to 110,000 more.
 
 *Settled.* (1) holds everywhere in the box if |L0| + move <= (rho / 2) (n - move).
 
