@@ -7,11 +7,6 @@ import sys
 from pathlib import Path
 from typing import IO
 
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
-
 TAKEN = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
 """Errors of a lock that another process has; others are of file systems without locks."""
 
@@ -27,9 +22,13 @@ def locked(path: Path) -> IO[bytes]:
     file = path.open("ab")
     try:
         if sys.platform == "win32":
+            import msvcrt  # there alone
+
             file.seek(0)
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         else:
+            import fcntl  # everywhere else
+
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in TAKEN:

@@ -8,7 +8,9 @@ from scipy.sparse import csr_array
 from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges
 
 SHARP = 0.3
-"""Sum of the angles at a vertex, in radians, below which it is a spike: twenty times as high as it is wide."""
+"""Sum of the angles at a vertex, in radians, below which it is a spike: twenty times as high as it is wide. On the rim
+a sixth of it, as there hands and heads that were cut out of bodies have thin triangles: with the whole of it 1 to 5
+vertices of each would be put back."""
 
 LONG, LONG_ON_RIM = 3, 20
 """A spike's edges are longer than so many usual ones, of the mesh and of those around it: where all triangles are thin,

@@ -3,13 +3,14 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from solver import AlignSettings
-from solver.collection import Plan, collect
+from solver.collection import Collection, Plan, Specimen, collect
 from solver.collection.folder import LONGEST, Folder, free_name
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -59,10 +60,12 @@ def test_a_long_name_is_cut_and_told_apart() -> None:
     assert free_name("x" * LONGEST) == "x" * LONGEST
 
 
-def test_what_failed_for_no_fault_of_the_surfaces_is_done_again(family, tmp_path: Path) -> None:
+def test_what_is_no_fault_of_the_surfaces_is_done_again(
+    family: Callable[[int], list[Specimen]], tmp_path: Path
+) -> None:
     rough = AlignSettings(refine="mobius", samples=40, targets=200)
 
-    def go():
+    def go() -> Collection:
         return collect(family(3), tmp_path, lambda: ThreadPoolExecutor(1), plan=Plan("all"), settings=rough)
 
     assert not go().failures

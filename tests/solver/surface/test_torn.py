@@ -105,5 +105,5 @@ def test_nothing_is_left_of_a_thin_tube(seed: int) -> None:
     normals = [mesh.face_vectors[np.lexsort(np.sort(faces, axis=1).T)] for mesh, faces in (
         (tidy.mesh, tidy.origin[tidy.mesh.faces]), (sheet, sheet.faces)
     )]  # fmt: skip
-    assert np.allclose(*normals)
+    assert np.allclose(normals[0], normals[1])
     assert tidy.vertex_of[np.unique(sheet.faces)].min() >= 0
