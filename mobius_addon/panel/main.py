@@ -14,7 +14,7 @@ from ..operators.swap import MOBIUS_OT_swap
 from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
-from ..usable import why_not
+from ..usable import why_not, why_not_written
 from .help import draw_help
 from .mending import draw_menu, draw_remedies
 from .place import MobiusPanel, beside_or_below, draw_sentence, draw_wrapped, hand_on
@@ -76,6 +76,8 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if line.remedy:
         column.prop(settings, line.remedy, toggle=True)
     draw_remedies(column, obj, line)
+    if role == "target" and (reason := why_not_written(obj)):
+        draw_sentence(column, context, reason, "LOCKED")
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:

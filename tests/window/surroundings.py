@@ -17,9 +17,8 @@ Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
 comparison = importlib.import_module(PACKAGE + ".mobius_addon.comparison")
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
-SLOWEST = 1.0
-"""Seconds that the window may take to draw itself with 100,000 faces, more than without an extension: it draws by
-software, beside other work."""
+SLOWEST = 1.5
+"""Times the processor's work for drawing the window that it may take once 100,000 faces are chosen, by software."""
 
 
 def steps() -> Wait:
@@ -218,7 +217,7 @@ def large(names: tuple[str, str]) -> Wait:
     yield from picture("large", 3.0)
     spent = drawn()
     print(f"[clicks] drawing: {without:.2f} s without, {spent:.2f} s with 100,000 faces chosen", flush=True)
-    assert spent < without + SLOWEST
+    assert spent < without * SLOWEST
     bpy.ops.mobius.align("INVOKE_DEFAULT", True, **QUICK)
     yield from until(lambda: Job.current is not None and Job.current.progress.fraction >= 0.1)
     start = time.perf_counter()
@@ -228,7 +227,7 @@ def large(names: tuple[str, str]) -> Wait:
 
 
 def drawn() -> float:
-    """How long the window takes to draw itself once."""
-    start = time.perf_counter()
+    """Return how long the processor works to draw the window once."""
+    start = time.process_time()
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
-    return (time.perf_counter() - start) / 3
+    return (time.process_time() - start) / 3
