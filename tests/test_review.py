@@ -21,6 +21,7 @@ OPENS_FILES = {
     "mobius_addon/collection",
     "mobius_addon/textures/images.py",
     "solver/collection/folder.py",
+    "solver/collection/lock.py",
     "solver/collection/tasks.py",
     "solver/collection/work.py",
 }
