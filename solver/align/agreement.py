@@ -1,4 +1,4 @@
-"""How well two surfaces agree at the points that a map brings together: in descriptors and in local scale."""
+"""How well two surfaces agree at the points that a map brings together: in descriptors, samples and local scale."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ..flatten.distortion import log_conformal_factor
 from ..flatten.sphere import Flat
-from ..mobius import Mobius, SphereMobius
+from ..mobius import Mobius, SphereMobius, hyperbolic_distance
+from ..search.matching import Objective
 from ..surface.mesh import Floats, Integers, Places
 from ..surface.statistics import weighted_median
 
@@ -21,6 +22,36 @@ def descriptor_distance(
     """Return the distance, (q,), of descriptors of target points, (q, d), from those at points of the source."""
     there = np.einsum("qk,qkd->qd", barycentric, source_descriptors[source.mesh.faces[face]])
     return np.sqrt(((there - target_descriptors) ** 2).sum(axis=1))
+
+
+def landed_weights(
+    source: Flat, target: Flat, carried: Places, reflected: bool, samples: Integers, objective: Objective
+) -> Floats:
+    """Return the weight, (N1,), with which each source sample matches where a map of all vertices puts it.
+
+    Unlike under the transformation that the search found, a bent map may bring together what the two discs hold in
+    different places, as fingers, which they shrink; and what began at a wrong transformation may come out right.
+
+    Parameters
+    ----------
+    source, target : Flat
+    carried : (n,) complex128
+        Where each target vertex goes in the source's disc.
+    reflected : bool
+        Whether it turns triangles over.
+    samples : (N1,) int
+        Source vertices.
+    objective : Objective
+        The match discs around the target's samples, and the weights.
+    """
+    faces = target.mesh.faces[:, [0, 2, 1]] if reflected else target.mesh.faces
+    face, barycentric = source.domain.triangulated(carried, faces).locate(source.places[samples])
+    places = target.domain.mean(target.places, faces[face], barycentric)
+    if target.domain.closed:
+        distance = np.linalg.norm(places[:, None] - objective.target, axis=2)
+    else:
+        distance = hyperbolic_distance(places[:, None], objective.target)
+    return np.where(distance <= objective.radius, objective.weights, 0.0).max(axis=1)
 
 
 def log_stretch(

@@ -15,7 +15,8 @@ from ..search.matching import Objective
 from ..search.rival import Rival
 from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned
-from .confidence import evidence, probability, unmatched_share
+from .agreement import landed_weights
+from .confidence import COLUMNS, evidence, probability, unmatched_share
 from .objective import usual_difference
 from .overlap import Piece
 from .remark import Remark
@@ -200,6 +201,25 @@ class Alignment:
         """Mean confidence, by area, where the map claims anything; 0 if that is nowhere."""
         areas = self.target.mesh.vertex_areas * (self.confidence > 0)
         return float(self.confidence @ areas / max(areas.sum(), np.finfo(float).tiny))
+
+    @property
+    def bent_confidence(self) -> float:
+        """Mean confidence where the samples count as matched that the bent map, not the search's, brings together.
+
+        Higher than `mean_confidence` where discs shrink what the bending finds, as fingers. It tells nothing of the
+        orientation: bent, a mirrored foot matches too.
+        """
+        inner = self if self.overlap is None else self.overlap.alignment
+        if inner.bending is None:
+            return self.mean_confidence
+        landed = landed_weights(
+            inner.source, inner.target, inner.carried, inner.mobius.reflected, inner.source_samples, inner.objective
+        )
+        seen = inner.evidence.copy()
+        seen[:, COLUMNS.index("unmatched samples")] = unmatched_share(float(landed.sum()), len(landed))
+        used = inner.target.mesh.used
+        areas = (inner.target.mesh.vertex_areas * (inner.confidence > 0))[used]
+        return float(probability(seen, bent=True) @ areas / max(areas.sum(), np.finfo(float).tiny))
 
     @cached_property
     def located(self) -> tuple[Integers, Floats]:

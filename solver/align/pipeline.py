@@ -83,7 +83,8 @@ def _with_doubts(found: Alignment, used: _Both) -> Alignment:
         likely = (replace(cause, before="doubtful, perhaps because ") for cause in known)
         doubt = Remark("doubtful", said)
         return replace(found, remarks=(*found.remarks, doubt, *likely), causes=tuple(one.kind for one in known))
-    if found.mean_confidence < FITS and any(one.kind == "partial" for one in found.remarks):
+    apart = any(one.kind == "partial" for one in found.remarks)
+    if apart and max(found.mean_confidence, found.bent_confidence) < FITS:
         said = (
             "unsure: what the surfaces have in common fits less well than it should, so what is said to be missing may "
             "only be stretched: look along its edge, or mark points there"

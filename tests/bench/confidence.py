@@ -28,6 +28,9 @@ FITTED += ["bodyparts", "noise", "depth", "coarse"]
 
 BINS = 10
 
+ENOUGH, CLOSE = 200, 0.1
+"""Points of a bin from which on it is judged, and how near its confidence is to be to what is true there."""
+
 MAPS = ("dense", "mobius")
 
 
@@ -81,15 +84,19 @@ def _evidence(found: Alignment) -> np.ndarray:
     return result
 
 
-def fitted(pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the coefficients of the logistic model, (d,), most likely for pairs of evidence and error.
+Seen = list[tuple[np.ndarray, np.ndarray]]
+"""Evidence and errors of the points of pairs."""
 
-    Each pair counts alike. Nothing that speaks against a map may speak for it: all but the constant are at most 0. A
-    weak ridge keeps what the data leaves open near 0.
+
+def fitted(kinds: list[Seen]) -> np.ndarray:
+    """Return the coefficients of the logistic model, (d,), most likely for pairs of evidence and error, by kind.
+
+    Each kind counts alike, and each pair alike within it. Nothing that speaks against a map may speak for it: all but
+    the constant are at most 0. A weak ridge keeps what the data leaves open near 0.
     """
-    x = np.concatenate([seen for seen, _ in pairs])
-    good = np.concatenate([error < BOUND for _, error in pairs])
-    weight = np.concatenate([np.full(len(error), 1 / len(error) / len(pairs)) for _, error in pairs])
+    x = np.concatenate([seen for pairs in kinds for seen, _ in pairs])
+    good = np.concatenate([error < BOUND for pairs in kinds for _, error in pairs])
+    weight = np.concatenate([_weight(pairs) for pairs in kinds]) / len(kinds)
     size = np.maximum(np.sqrt(weight @ x**2), 1e-12)
 
     def loss(b: np.ndarray) -> tuple[float, np.ndarray]:
@@ -100,6 +107,11 @@ def fitted(pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
 
     bounds = [(None, None), *[(None, 0.0)] * (x.shape[1] - 1)]
     return minimize(loss, np.zeros(x.shape[1]), jac=True, method="L-BFGS-B", bounds=bounds).x / size
+
+
+def _weight(pairs: Seen) -> np.ndarray:
+    """Return how much each point counts: each pair alike."""
+    return np.concatenate([np.full(len(error), 1 / len(error) / len(pairs)) for _, error in pairs])
 
 
 def calibration(trust: np.ndarray, good: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -114,23 +126,32 @@ def calibration(trust: np.ndarray, good: np.ndarray, weight: np.ndarray) -> tupl
         )
 
 
-def checked(
-    seen: dict[str, list[tuple[np.ndarray, np.ndarray]]],
-) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def checked(seen: dict[str, Seen]) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Return confidence, error and weight of the points of each kind, (q,) each, by the model of the other kinds."""
     held = {}
     for kind, pairs in seen.items():
-        others = fitted([found for other, some in seen.items() if other != kind for found in some])
+        others = fitted([some for other, some in seen.items() if other != kind])
         trust = np.concatenate([expit(x @ others) for x, _ in pairs])
         error = np.concatenate([e for _, e in pairs])
-        weight = np.concatenate([np.full(len(e), 1 / len(e) / len(pairs)) for _, e in pairs])
+        weight = _weight(pairs)
         said, right, share = calibration(trust, error < BOUND, weight)
         print(
             f"    {kind:12s} below {100 * BOUND:g} %: {weight @ (error < BOUND):.3f}, confidence {weight @ trust:.3f}, "
-            f"apart {np.nansum(share * np.abs(said - right)):.3f}"
+            f"apart {np.nansum(share * np.abs(said - right)):.3f}; {_of_bins(trust, error)}"
         )
         held[kind] = trust, error, weight
     return held
+
+
+def _of_bins(trust: np.ndarray, error: np.ndarray) -> str:
+    """Say how many bins of enough points there are, and in which of them the confidence is off by how much."""
+    bins = np.minimum((trust * BINS).astype(int), BINS - 1)
+    full = [bins == k for k in range(BINS) if (bins == k).sum() >= ENOUGH]
+    off = [float(trust[one].mean() - (error[one] < BOUND).mean()) for one in full]
+    far = ", ".join(f"{each:+.2f}" for each in off if abs(each) > CLOSE)
+    return f"{len(full)} bins of {ENOUGH} points, {sum(abs(each) <= CLOSE for each in off)} within {CLOSE}" + (
+        f" (others off by {far})" if far else ""
+    )
 
 
 def picture(path: Path, held: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
@@ -189,7 +210,7 @@ def main() -> None:
             kinds[kind].append(observed(pair, store, wrong))
     for name in MAPS:
         seen = {kind: [found[name] for found in pairs] for kind, pairs in kinds.items()}
-        coefficients = fitted([found for pairs in seen.values() for found in pairs])
+        coefficients = fitted(list(seen.values()))
         print(f"{name}: " + ", ".join(f"{c} {v:.4g}" for c, v in zip(COLUMNS, coefficients, strict=True)))
         held = checked(seen)
         if options.plot and name == "dense":
