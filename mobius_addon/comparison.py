@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .textures.preview import is_preview_of, remove_preview
+from .textures.marks import is_preview_of, leave_out_preview, remove_preview
 
 COLLECTION = "Mobius Side by Side"
 
@@ -33,7 +33,7 @@ def remember_selection(context: bpy.types.Context) -> None:
     collection["active"] = "" if active is None or is_copy(active) else active.name
 
 
-def _select_as_before(context: bpy.types.Context) -> None:
+def select_as_before(context: bpy.types.Context) -> None:
     """Select what was selected before the copies were, of what is still there."""
     collection, objects = context.scene.collection.children[COLLECTION], context.view_layer.objects
     names = [name for name in collection.get("selected", ()) if name in objects]
@@ -50,15 +50,20 @@ def is_shown(context: bpy.types.Context) -> bool:
 
 def copies(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object] | None:
     """Return the copies of source and target that the scene shows, None if it does not show both."""
-    collection = context.scene.collection.children.get(COLLECTION)
-    found = {obj.get(_ROLE): obj for obj in collection.objects} if collection is not None else {}
+    found = {obj[_ROLE]: obj for obj in of_scene(context.scene)}
     return (found["source"], found["target"]) if found.keys() >= {"source", "target"} else None
+
+
+def of_scene(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the copies that a scene shows."""
+    collection = scene.collection.children.get(COLLECTION)
+    return [obj for obj in collection.objects if is_copy(obj)] if collection is not None else []
 
 
 def end(context: bpy.types.Context) -> None:
     """Remove the copies, if there are any; the meshes stay."""
     if is_shown(context):
-        _select_as_before(context)
+        select_as_before(context)
         _remove(context.scene.collection.children[COLLECTION])
 
 
@@ -87,9 +92,35 @@ def add(context: bpy.types.Context, obj: bpy.types.Object, role: str, name: str,
     copy.matrix_world = matrix
     copy.show_only_shape_key, copy.active_shape_key_index = obj.show_only_shape_key, obj.active_shape_key_index
     collection.objects.link(copy)
+    leave_out()
+
+
+def leave_out() -> None:
+    """Have Blender leave the copies out when it saves the file, with their collection and what a preview has made.
+
+    It asks for that at each save too: it is not known what a person has done with them since.
+    """
+    collection = bpy.data.collections.get(COLLECTION)
+    if collection is None or not collection.is_editable:
+        return
+    _give_back(collection)
+    collection.is_runtime_data = True
+    for obj in collection.objects:
+        obj.is_runtime_data = True
+        leave_out_preview(obj.data)
+
+
+def _give_back(collection: bpy.types.Collection) -> None:
+    """Put what a person has added to the collection of the comparison into the collections of its scenes."""
+    for obj in [obj for obj in collection.objects if not is_copy(obj)]:
+        for scene in bpy.data.scenes:
+            if COLLECTION in scene.collection.children and obj.name not in scene.collection.objects:
+                scene.collection.objects.link(obj)
+        collection.objects.unlink(obj)
 
 
 def _remove(collection: bpy.types.Collection) -> None:
+    _give_back(collection)
     for obj in list(collection.objects):
         mesh = obj.data
         bpy.data.objects.remove(obj)

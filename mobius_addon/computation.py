@@ -16,7 +16,10 @@ from ..solver import (
     Cleaned,
     Correspondence,
     Flattening,
+    MeshError,
     Progress,
+    SphereFlattening,
+    Surface,
     TriangleMesh,
     align,
     cleaned,
@@ -27,6 +30,7 @@ from ..solver import (
 from ..solver.align.prepared import cleaning_notes, flattening_notes
 from ..solver.flatten.distortion import signed_areas
 from ..solver.surface.mesh import Booleans, Floats, Integers, plural
+from ..solver.surface.tidy import Piece
 from .kept_surfaces import surface_of
 from .mesh_data import Refusal
 
@@ -103,6 +107,16 @@ def flattened(
     return Flat(found, tidy, (*cleaning_notes(tidy), *flattening_notes(found), *_layout_notes(found)))
 
 
+def on_sphere(mesh: TriangleMesh, repair: Repair, keys: Floats | None = None) -> tuple[SphereFlattening, Cleaned]:
+    """Return the map of a closed mesh, put in order, to the unit sphere; see `solver.flatten_sphere`."""
+    surface = Surface(mesh, fill_holes=repair.fill_holes, largest_part=repair.largest_part, keys=keys)
+    if (surface.cleaned.mesh.twins < 0).any():
+        raise MeshError(f"'{mesh.name}' has a boundary: only what is closed goes to a sphere")
+    flat = surface.flattening
+    assert isinstance(flat, SphereFlattening)
+    return flat, surface.cleaned
+
+
 def _layout_notes(found: Flattening) -> tuple[str, ...]:
     """Say how many triangles have no area in the single precision of a UV map."""
     stored = np.stack([found.disc.real, found.disc.imag], axis=1).astype(np.float32) / 2 + np.float32(0.5)
@@ -119,14 +133,15 @@ def aligned(
     *,
     largest_part: bool = True,
     keys: tuple[Floats | None, Floats | None] = (None, None),
-    within: tuple[Booleans | None, Booleans | None] = (None, None),
+    within: tuple[Piece | None, Piece | None] = (None, None),
     landmarks: Integers | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> tuple[Alignment, Correspondence]:
     """Return the alignment of two meshes put in order, and their correspondence in the triangles they came with.
 
     What was done to the meshes comes first among the alignment's warnings. `keys` are what shape keys say of which
-    vertices belong together, `within` the vertices of the pieces that are to be matched. See `solver.align`.
+    vertices belong together, `within` the vertices of the pieces that are to be matched, or the edges that cut
+    them out. See `solver.align`.
     """
     source_surface, target_surface = (
         surface_of(

@@ -67,6 +67,18 @@ def reshaped_object(
     return obj
 
 
+def sphere_object(obj: bpy.types.Object, places: Floats) -> bpy.types.Object:
+    """Return a new object with all that is on a mesh, about the origin, its vertices at places on a sphere, (n, 3)."""
+    made = _copy(obj, obj, f"{obj.name} on the sphere")
+    made.shape_key_clear()
+    made.data.vertices.foreach_set("co", places.astype(np.float32).ravel())
+    made.matrix_world.identity()
+    if is_mirrored(obj):
+        made.data.flip_normals()
+    made.data.update()
+    return made
+
+
 def surface_rest(source: bpy.types.Object, surface: Surface) -> Floats:
     """Return the vertices at rest, (n, 3), in the object's own space."""
     return mirrored(source, surface.rest.vertices)

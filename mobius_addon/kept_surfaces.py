@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..solver import Surface, TriangleMesh
-from ..solver.surface.mesh import Booleans, Floats
+from ..solver.surface.mesh import Floats
+from ..solver.surface.tidy import Piece
 
 KEPT = 4
 """Surfaces whose flattening, curvature and points are kept: those of the last pair, and of the one before."""
@@ -19,7 +20,7 @@ def surface_of(
     largest_part: bool,
     outer_vertex: int | None,
     keys: Floats | None = None,
-    within: Booleans | None = None,
+    within: Piece | None = None,
 ) -> Surface:
     """Return the surface that a mesh is, as it was prepared before if name, positions and faces are the same."""
     moved, piece = (None if x is None else x.tobytes() for x in (keys, within))

@@ -65,7 +65,7 @@ def of_mesh(mesh: bpy.types.Mesh) -> LastTransfer | None:
 
 def describe_counts(counts: dict[str, int]) -> str:
     """Return what a transfer carried, as in '3 vertex groups, 1 UV map'."""
-    nouns = {kind.identifier: kind.noun for kind in KINDS}
+    nouns = {kind.identifier: kind.noun for kind in KINDS} | {"data": "files of data"}
     return ", ".join(f"{n} {nouns[kind] if n > 1 else nouns[kind].removesuffix('s')}" for kind, n in counts.items())
 
 

@@ -62,7 +62,8 @@ def render_sheet(
         turns = _turns(pair[0], surfaces, correspondence)
         for row, (obj, surface, turn) in enumerate(zip(pair, surfaces, turns, strict=True)):
             rest = surface.rest.vertices
-            shapes = [rest] + [rest + mirrored(obj, key_displacement(obj, names[row])) for names in chosen]
+            moved = [np.sum([key_displacement(obj, x[row]) for x in together(names, keys)], axis=0) for names in chosen]
+            shapes = [rest] + [rest + mirrored(obj, values) for values in moved]
             for column, shape in enumerate(shapes):
                 corner = np.array([left + _WIDTH * column, top - _HEIGHT * (row + 1)])
                 frame = np.array([corner + 0.05, corner + np.array([_WIDTH, _HEIGHT]) - 0.05], dtype=np.float64)
@@ -74,7 +75,8 @@ def render_sheet(
                 mesh.update()
                 put(scene, mesh, clay, place)
         for column, names in enumerate(chosen, 1):
-            write(scene, names[0], (left + _WIDTH * (column + 0.5), 0.1 - top))
+            text = " + ".join(one[0] for one in together(names, keys))
+            write(scene, text, (left + _WIDTH * (column + 0.5), 0.1 - top))
         render(scene, path)
 
 
@@ -87,6 +89,13 @@ def chosen_keys(source: bpy.types.Object, keys: Sequence[tuple[str, str]]) -> li
     moved = {names: float((key_displacement(source, names[0]) ** 2).sum()) for names in rest}
     found += sorted(rest, key=lambda names: -moved[names])[: _SHOWN - len(found)]
     return [names for names in keys if names in found]
+
+
+def together(names: tuple[str, str], keys: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the keys that are shown with one: lips that close over an open jaw, as mouthClose does, with that jaw."""
+    if understood(names[0]) != ("mouthClose", ""):
+        return [names]
+    return [names, *[one for one in keys if understood(one[0]) == ("jawOpen", "")][:1]]
 
 
 def key_displacement(obj: bpy.types.Object, name: str) -> Floats:

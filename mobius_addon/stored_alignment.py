@@ -139,7 +139,7 @@ def figures(target: bpy.types.Object) -> dict[str, Any] | None:
     return _parsed(target.data.mobius_alignment.report)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)  # the panel lists many
 def _parsed(report: str) -> dict[str, Any] | None:
     try:
         return json.loads(report)

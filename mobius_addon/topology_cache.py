@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
@@ -12,7 +13,7 @@ from ..solver import Cleaned, MeshError, Topology, topology
 from ..solver.align.held import held
 from . import edits
 from .computation import Repair, in_order
-from .mesh_data import Surface, read_surface
+from .mesh_data import Surface, foreach, read_surface
 
 MAX_POLYGONS = 200_000
 """Larger meshes are checked when asked only, so that drawing the panel never takes noticeable time."""
@@ -41,12 +42,15 @@ class Line:
         Whether there is something to select: what is in the way, or the loops that will be filled.
     remedy : str
         The setting that helps when it is turned on; empty if none does.
+    edits : tuple of str
+        What would mend the mesh itself, as `operators.mend` calls it; for the computation it need not be done.
     """
 
     rows: tuple[str, ...]
     is_disc: bool | None
     selectable: bool = False
     remedy: str = ""
+    edits: tuple[str, ...] = ()
 
 
 # a cache, never the truth: it can be emptied at any time
@@ -69,7 +73,24 @@ def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
 
 def store(obj: bpy.types.Object, surface: Surface, repair: Repair) -> None:
     """Find out and keep what an object's mesh is."""
-    _lines[_key(obj, repair)] = _line(surface, repair)
+    line = _line(surface, repair)
+    seams = foreach(obj.data.edges, "use_seam", 1, np.bool_).any()
+    _lines[_key(obj, repair)] = replace(line, edits=_edits(topology(surface.mesh), line, has_seams=bool(seams)))
+
+
+def _edits(found: Topology, line: Line, *, has_seams: bool) -> tuple[str, ...]:
+    """Return what may mend a mesh of this topology; nothing of a clean one."""
+    troubled = not line.is_disc or line.selectable
+    fitting = {
+        "largest": found.parts > 1,
+        "fill": found.parts == 1 and len(found.boundary_loops) > 1,
+        "inner": len(found.non_manifold_edges) > 0,
+        "cut": has_seams and (not line.is_disc or not found.boundary_loops),
+        "normals": len(found.inconsistent_edges) > 0,
+        "join": troubled,
+        "flip": troubled,
+    }
+    return tuple(how for how, fits in fitting.items() if fits)
 
 
 def _line(surface: Surface, repair: Repair) -> Line:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -146,22 +146,67 @@ def look_at_all_again(context: bpy.types.Context) -> None:
     """Leave the view of some objects alone in every viewport that was made to look so; show all as it was before."""
     if not _alone and (space := space_of(context)) is not None and space.local_view:  # since a file was opened
         _toggle_local_view(context)
-    overlay = context.window_manager.mobius_view
     for window, area, space in _viewports(context):
         before = _alone.pop(space.as_pointer(), None)
         if before is None:
             continue
         if space.local_view:
-            region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(window=window, area=area, region=region):
-                bpy.ops.view3d.localview(frame_selected=False)
-        view = space.region_3d
-        view.view_perspective, view.view_rotation = before.perspective, before.rotation
-        view.view_location, view.view_distance = before.location, before.distance
-        _shade(space, before.shading)
+            _toggle_in(context, window, area)
+        _look(context, space, before)
         if before.shading[1] != "VERTEX":
             _before.pop(space.as_pointer(), None)
-        overlay.matches, overlay.legend = before.overlay
+
+
+Away = list[tuple[int, _View, _View, tuple[str, str] | None]]
+"""Of each viewport that looked at some objects alone, told by its address: how it looked before, how then, and what
+shading it had before it showed our colors."""
+
+
+def put_away(context: bpy.types.Context) -> Away:
+    """Have viewports that look at some objects alone look at all again for a moment; return what `put_back` needs."""
+    spaces = [space for _, _, space in _viewports(context) if space.as_pointer() in _alone]
+    away = [(x.as_pointer(), _alone[x.as_pointer()], _view_of(context, x), _before.get(x.as_pointer())) for x in spaces]
+    if away:
+        look_at_all_again(context)
+    return away
+
+
+def put_back(context: bpy.types.Context, away: Away, objects: Sequence[bpy.types.Object]) -> None:
+    """Have viewports look at these objects alone again, as they did before `put_away`."""
+    known = {address: (before, then, shading) for address, before, then, shading in away}
+    for window, area, space in _viewports(context):
+        if space.as_pointer() not in known:
+            continue
+        before, then, shading = known[space.as_pointer()]
+        if not space.local_view:
+            _toggle_in(context, window, area)
+            if not space.local_view:
+                continue
+            for obj in window.view_layer.objects:
+                obj.local_view_set(space, obj in objects)
+        _look(context, space, then, force=True)
+        _alone[space.as_pointer()] = before
+        if shading is not None:
+            _before[space.as_pointer()] = shading
+
+
+def _look(context: bpy.types.Context, space: bpy.types.SpaceView3D, how: _View, *, force: bool = False) -> None:
+    """Have a viewport look from where and as it once did; its shading only if it shows our colors, or where forced."""
+    view, overlay = space.region_3d, context.window_manager.mobius_view
+    view.view_perspective, view.view_rotation = how.perspective, how.rotation
+    view.view_location, view.view_distance = how.location, how.distance
+    if force:
+        space.shading.type, space.shading.color_type = how.shading
+    else:
+        _shade(space, how.shading)
+    overlay.matches, overlay.legend = how.overlay
+
+
+def _toggle_in(context: bpy.types.Context, window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Enter the local view of an area's viewport, or leave it."""
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view3d.localview(frame_selected=False)
 
 
 def _viewports(context: bpy.types.Context) -> Iterator[tuple[Any, Any, Any]]:
@@ -184,8 +229,8 @@ def _view_of(context: bpy.types.Context, space: bpy.types.SpaceView3D) -> _View:
     )
 
 
-def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
-    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it.
+def edit(context: bpy.types.Context, obj: bpy.types.Object, *, look: bool = True) -> str | None:
+    """Go to Edit Mode of an object alone and, where there is a window, look at what is selected of it if asked to.
 
     Returns
     -------
@@ -209,10 +254,16 @@ def edit(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
         other.select_set(other == obj)
     layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    if space is not None:
+    if look:
+        look_at_selected(context)
+    return None
+
+
+def look_at_selected(context: bpy.types.Context) -> None:
+    """Have the viewport, where there is one, look at what is selected."""
+    if space_of(context) is not None:
         with _in_viewport(context):
             bpy.ops.view3d.view_selected()
-    return None
 
 
 def _toggle_local_view(context: bpy.types.Context) -> None:

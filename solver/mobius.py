@@ -169,7 +169,7 @@ class SphereMobius:
     def __matmul__(self, first: SphereMobius) -> SphereMobius:
         """Return the composition: (a @ b)(x) = a(b(x))."""
         inner = first.conjugate() if self.reflected else first
-        return _of_matrix(_spinor(self) @ _spinor(inner), self.reflected != first.reflected)
+        return from_spinor_matrix(spinor_matrix(self) @ spinor_matrix(inner), self.reflected != first.reflected)
 
     def derivative(self, x: npt.ArrayLike) -> Floats:
         """Return the factor by which lengths grow at points x, (..., 3)."""
@@ -184,14 +184,24 @@ def _parts(mobius: SphereMobius) -> tuple[tuple[float, float, float], tuple[floa
     return mobius.h, mobius.rotation
 
 
-def _spinor(mobius: SphereMobius) -> Complexes:
+def spinors(x: npt.ArrayLike) -> Complexes:
+    """Return the unit vectors psi of C^2, (n, 2), that points of the sphere stand for: psi psi' = (I + x.sigma) / 2."""
+    a, b, c = np.asarray(x, dtype=np.float64).T
+    large = np.sqrt((1 + np.abs(c)) / 2)
+    small = 1 / (2 * large)
+    up = c >= 0
+    first = np.where(up, large, (a - 1j * b) * small)
+    return np.stack([first, np.where(up, (a + 1j * b) * small, large)], axis=1)
+
+
+def spinor_matrix(mobius: SphereMobius) -> Complexes:
     """Return R T_h as a matrix, (2, 2), up to scale."""
     (x, y, z), (w, a, b, c) = mobius.h, mobius.rotation
     turn = np.array([[w - 1j * c, -b - 1j * a], [b - 1j * a, w + 1j * c]]) / math.hypot(*mobius.rotation)
     return turn @ np.array([[1 - z, -x + 1j * y], [-x - 1j * y, 1 + z]], np.complex128)
 
 
-def _of_matrix(a: Complexes, reflected: bool) -> SphereMobius:
+def from_spinor_matrix(a: Complexes, reflected: bool = False) -> SphereMobius:
     """Return what a matrix, (2, 2), stands for: its polar decomposition into a rotation and I - h.sigma."""
     square = np.conj(a.T) @ a  # (1 + |h|^2) I - 2 h.sigma, up to scale
     half = float(square[0, 0].real + square[1, 1].real)

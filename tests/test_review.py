@@ -2,6 +2,7 @@
 
 import ast
 import re
+import struct
 import subprocess
 import tomllib
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ OPENS_FILES = {
     "mobius_addon/textures/images.py",
     "solver/collection/folder.py",
     "solver/collection/tasks.py",
+    "solver/collection/work.py",
 }
 WORKER = "solver/collection/worker.py"  # in processes of its own, which have to find the extension
 KNOWS_ITS_PLACE = {"mobius_addon/preset_menus.py", "mobius_addon/operators/example.py"}  # presets, the guide
@@ -57,12 +59,13 @@ def test_files_are_opened_where_files_are_the_subject() -> None:
     def opens(node: ast.AST) -> bool:
         if isinstance(node, ast.Call):
             return "open" in (getattr(node.func, "id", ""), getattr(node.func, "attr", ""))
-        return isinstance(node, ast.Attribute) and node.attr in ("write_text", "write_bytes", "unlink", "rmtree")
+        if not isinstance(node, ast.Attribute) or node.attr not in ("write_text", "write_bytes", "unlink", "rmtree"):
+            return False
+        # objects are taken out of collections, which Blender calls unlink too
+        return getattr(node.value, "attr", "") not in ("objects", "children")
 
     found = {name for name, tree in trees() if any(map(opens, ast.walk(tree)))}
     stray = {name for name in found if not may(name, OPENS_FILES | {"mobius_addon/command_line/output_files.py"})}
-    # the example takes objects out of collections, which Blender calls unlink too
-    stray -= {"mobius_addon/operators/example.py"}
     assert stray <= {"mobius_addon/demo/__init__.py", "solver/carry/map_file.py", "solver/align/surface_file.py"}
     assert found, "the test sees nothing"
 
@@ -129,3 +132,12 @@ def test_no_file_is_large_or_of_a_kind_that_nobody_can_read() -> None:
     assert max(sizes.values()) < 200_000, max(sizes, key=lambda name: sizes[name])
     assert sum(sizes.values()) < 3_000_000
     assert {Path(name).suffix for name in sizes} <= {".py", ".c", ".html", ".png"}
+
+
+def test_the_icon_is_what_the_platform_takes_and_stays_out_of_the_zip() -> None:
+    """It is uploaded beside the zip: a square PNG of 256 texels, transparent around. `release.icon` draws it."""
+    data = (ROOT / "docs/icon.png").read_bytes()
+    kind, width, height, bits, color = struct.unpack(">4sIIBB", data[12:26])
+    assert (data[:8], kind, width, height, bits, color) == (b"\x89PNG\r\n\x1a\n", b"IHDR", 256, 256, 8, 6)
+    assert "/docs/*" in MANIFEST["build"]["paths_exclude_pattern"]
+    assert "!/docs/icon.png" not in MANIFEST["build"]["paths_exclude_pattern"]

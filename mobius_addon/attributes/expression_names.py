@@ -135,7 +135,7 @@ def spelled(base: str, side: str, spelling: Spelling) -> str:
 
 
 def renamed(
-    names: Iterable[str], spelling: Spelling, flipped: Callable[[str], str] | None = None
+    names: Iterable[str], spelling: Spelling, flipped: Callable[[str], str] | None = None, *, join: bool = True
 ) -> dict[str, tuple[str, ...]]:
     """Return the names that expressions get, each with those of the source that it is the sum of.
 
@@ -147,6 +147,8 @@ def renamed(
         'browInnerUp_R' are 'browInnerUp'.
     flipped : callable, optional
         Given where the map mirrors: it returns a name with left and right exchanged.
+    join : bool
+        Whether halves become one at all.
 
     Examples
     --------
@@ -164,7 +166,7 @@ def renamed(
         new = name if flipped is None else flipped(name)
         if meaning is not None:
             base, side = meaning
-            if spelling == "arkit" and base in WHOLE and sides[base] == {"L", "R"}:
+            if join and spelling == "arkit" and base in WHOLE and sides[base] == {"L", "R"}:
                 result[base] = (*result.get(base, ()), name)
                 continue
             if flipped is not None:

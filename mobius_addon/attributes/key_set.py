@@ -65,6 +65,8 @@ class KeyPlan:
         What the target's keys shall be.
     in_time : bool
         Whether they take over the source's time, as absolute keys.
+    halves : mapping of str to str
+        Further names on the target, of keys of the source that have become two.
     """
 
     source: KeySet
@@ -72,6 +74,7 @@ class KeyPlan:
     sliders: Mapping[str, Slider]
     relative: bool
     in_time: bool
+    halves: Mapping[str, str]
 
     def prepare(self, obj: bpy.types.Object) -> None:
         """Make the target's first key, and its keys relative or absolute, before keys are written."""
@@ -95,6 +98,8 @@ class KeyPlan:
         source = bpy.data.objects.get(self.source.owner)
         if source is not None and source.type == "MESH" and source.data.shape_keys is not None:
             carry_animation(source, obj, self.names, time=self.in_time)
+            if self.halves:
+                carry_animation(source, obj, self.halves, time=False)
 
 
 def planned(
@@ -111,21 +116,24 @@ def planned(
     target : str
         What messages call the target.
     """
-    names = {old: new for old, new, _ in sliders}
+    names: dict[str, str] = {}
+    halves: dict[str, str] = {}
+    for old, new, _ in sliders:
+        (halves if old in names else names)[old] = new
     found = {new: slider for _, new, slider in sliders}
     own = [] if there is None else [name for name in there.names if name not in found]
     if not own or there is None:
-        return KeyPlan(source, names, found, source.relative, not source.relative), []
+        return KeyPlan(source, names, found, source.relative, not source.relative, halves), []
     if there.relative:
         if source.relative:
-            return KeyPlan(source, names, found, True, False), []
+            return KeyPlan(source, names, found, True, False, halves), []
         still = {name: replace(slider, value=0.0, frame=None) for name, slider in found.items()}
         note = (
             f"the shape keys of '{source.owner[0]}' are absolute and those of '{target}' relative: the carried ones "
             "are relative there, at 0, and follow no time"
         )
-        return KeyPlan(source, names, still, True, False), [note]
+        return KeyPlan(source, names, still, True, False, halves), [note]
     base = there.last_frame + STEP
     later = {name: replace(slider, frame=base + STEP * k) for k, (name, slider) in enumerate(found.items())}
     note = f"'{target}' has absolute shape keys of its own: the carried ones stand after them, from frame {base:g} on"
-    return KeyPlan(source, names, later, False, False), [note]
+    return KeyPlan(source, names, later, False, False, halves), [note]

@@ -13,19 +13,19 @@ from .expression_names import Spelling, renamed
 
 
 def named_layers(
-    kind: str, layers: Sequence[Layer], spelling: Spelling, mirrors: bool
+    kind: str, layers: Sequence[Layer], spelling: Spelling, mirrors: bool, *, join: bool = True
 ) -> tuple[list[tuple[Layer, str]], list[str]]:
     """Return layers with the names that they are to have, and sentences about it.
 
     Where the map mirrors, left and right change places in the names of vertex groups and shape keys, as Blender flips
-    them. Halves that become one shape key are added up; it has the slider of the first.
+    them. Halves that become one shape key are added up, if they may `join`; it has the slider of the first.
     """
     if kind not in ("vertex-groups", "shape-keys") or (spelling == "keep" and not mirrors):
         return [(layer, layer.name) for layer in layers], []
     flipped = bpy.utils.flip_name if mirrors else None
     there = {layer.name: layer for layer in layers}
     result = []
-    for name, parts in renamed(there, spelling if kind == "shape-keys" else "keep", flipped).items():
+    for name, parts in renamed(there, spelling if kind == "shape-keys" else "keep", flipped, join=join).items():
         first = there[parts[0]]
         for part in parts[1:]:
             first = replace(first, values=first.values + there[part].values)

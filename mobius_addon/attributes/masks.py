@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...solver.surface.mesh import Booleans, Floats, Integers
+from ...solver.surface.mesh import Floats, Integers
+from ...solver.surface.tidy import Piece
 from ..mesh_data import Refusal, foreach
 from .settings import Mask
 from .vertex_groups import read_weights
@@ -50,10 +51,19 @@ def mask_weights(obj: bpy.types.Object, mask: Mask) -> Floats | None:
     return weights
 
 
-def piece_of(obj: bpy.types.Object, name: str) -> Booleans | None:
-    """Return the vertices, (n,), of the piece that a vertex group or attribute names, or 'selection'; None for ''."""
+def piece_of(obj: bpy.types.Object, name: str) -> Piece | None:
+    """Return what an option names of an object, None for ''.
+
+    The vertices, (n,), of a vertex group or attribute, or those selected for 'selection'; for 'seams' the edges,
+    (k, 2), that are marked as such, along which it is cut open.
+    """
     if not name:
         return None
+    if name == "seams" and name not in mask_names(obj):
+        marked = foreach(obj.data.edges, "use_seam", 1, np.bool_)
+        if not marked.any():
+            raise Refusal(f"'{obj.name}' has no edge marked as a seam: mark some in Edit Mode (Edge > Mark Seam)")
+        return foreach(obj.data.edges, "vertices", 2, np.int32)[marked].astype(np.intp)
     mask = Mask("selected") if name == "selection" and name not in mask_names(obj) else Mask("named", name)
     weights = mask_weights(obj, mask)
     return None if weights is None else weights >= 0.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import bpy
@@ -19,6 +19,7 @@ from .carrier import Carrier, Values
 from .chosen import chosen_layers
 from .key_animation import left_behind
 from .key_set import KeyPlan, KeySet, key_set, planned
+from .key_sides import symmetric, with_halves
 from .layer_names import named_layers
 from .looks import Looks, looks_of
 from .missing import carried_without_missing, missing_warning
@@ -47,6 +48,10 @@ class _Pending:
     place: Place
 
 
+class NothingThere(Refusal):
+    """The source has nothing of what is to be carried."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reading:
     """Everything that a transfer needs of the two objects, as arrays: `carry` may run in a thread of its own."""
@@ -64,6 +69,7 @@ class Reading:
     unmatched: Unmatched
     textures: TextureReading | None = None
     rig: RigReading | None = None
+    twins: Mapping[str, str] | None = None
 
     def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
         """Carry every layer.
@@ -72,8 +78,10 @@ class Reading:
         ------
         Cancelled
             The progress callback returned False.
+        NothingThere
+            Nothing is left to write.
         Refusal
-            Nothing is left to write, or there are more UV maps than Blender allows.
+            There are more UV maps than Blender allows.
         """
         warnings = list(self.warnings)
         layers: list[tuple[_Pending, Carried]] = []
@@ -96,10 +104,15 @@ class Reading:
                 warnings.append(missing_warning(row, name, self.names[0], missing))
             layers.append((pending, carried))
         if not layers and self.textures is None:
-            raise Refusal(_nothing(self.names[0], self.settings, warnings))
+            raise NothingThere(_nothing(self.names[0], self.settings, warnings))
         textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))
         warnings += () if textures is None else textures.notes
-        placed, notes = self._placed(self._tidied(layers))
+        layers = self._tidied(layers)
+        if self.twins is not None:
+            carried_layers, more = symmetric([x for _, x in layers], self.twins, self.carrier.target.rest)
+            layers = [(pending, x) for (pending, _), x in zip(layers, carried_layers, strict=True)]
+            warnings += more
+        placed, notes = self._placed(layers)
         settled, keys, more = self._settled(placed)
         maps = self.maps | {x.name for x in settled if x.row.kind == "uv"}
         if len(maps) > MAX_UV_MAPS:
@@ -225,7 +238,7 @@ def read_transfer(
 
     Raises
     ------
-    Refusal
+    NothingThere
         Nothing to carry.
     """
     read, warnings, locked = [], [], []
@@ -238,10 +251,13 @@ def read_transfer(
             layers = list(row.access.layers(whence, chosen_layers(row.kind, source, target, settings)))
             if keys and not _groups_come_along(settings, shown_source):
                 layers = [limited(layer) for layer in layers]
+            origin: dict[str, str] = {}
+            if keys and settings.halves:
+                layers, origin = with_halves(layers, way.source.rest.vertices)
             mirrors = row.kind in ("vertex-groups", "shape-keys") and bool(layers) and carrier.mirrors
-            named, notes = named_layers(row.kind, layers, settings.spelling, mirrors)
+            named, notes = named_layers(row.kind, layers, settings.spelling, mirrors, join=not settings.halves)
             warnings += notes
-            read.append((row, way, named))
+            read.append((row, way, [(replace(x, name=origin.get(x.name, x.name)), name) for x, name in named]))
     pending: list[_Pending] = []
     reserved = {name for _, _, layers in read for _, name in layers}
     earlier = unedited(target, settings.kinds)
@@ -255,14 +271,13 @@ def read_transfer(
                 continue
             if name != wanted and not row.marks:
                 warnings.append(f"'{target.name}' has something else named '{wanted}': it becomes '{name}'")
-            found.append((layer, name))
-        names = [name for _, name in found]
-        wanted_of = {layer.name: name for layer, name in layers}
+            found.append((layer, name, wanted))
+        names = [name for _, name, _ in found]
         there = row.access.existing(target, names)
         if isinstance(row.access, ShapeKeyAccess) and joins(row, settings):
             there = row.access.shown(target, names)
-        for layer, name in found:
-            place = _place(row, target, layer.name, name, there.get(name), earlier, reserved, wanted_of[layer.name])
+        for layer, name, wanted in found:
+            place = _place(row, target, layer.name, name, there.get(name), earlier, reserved, wanted)
             reserved |= {x for x in (place.before, place.beside) if x is not None}
             pending.append(_Pending(row, way, layer, place))
     textures = None
@@ -275,7 +290,7 @@ def read_transfer(
         rig, notes = read_rig(source, target, keys_carrier or carrier)
         warnings += notes
     if not pending and textures is None:
-        raise Refusal(_nothing(source.name, settings, warnings))
+        raise NothingThere(_nothing(source.name, settings, warnings))
     if users_of(target.data) > 1:
         warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
     warnings += left_behind(source, target, [x.layer.name for x in pending if x.row.kind == "shape-keys"])
@@ -296,6 +311,7 @@ def read_transfer(
         unmatched or Unmatched.of(carrier),
         textures,
         rig,
+        {x.place.name: bpy.utils.flip_name(x.place.name) for x in pending} if settings.symmetric else None,
     )
 
 

@@ -71,6 +71,10 @@ class TransferSettings:
         Carry the armature that moves the source too, fitted to the target; see `rig.RigReading`.
     spelling : str
         How carried expressions are called, see `expression_names.Spelling`.
+    halves : bool
+        Carry expressions that are one for both sides as two, see `key_sides.with_halves`; never join two.
+    symmetric : bool
+        Make carried shape keys symmetric that nearly are, see `key_sides.symmetric`.
     evaluated : bool
         Read the source as its modifiers and shape keys show it.
     collisions : str
@@ -102,6 +106,8 @@ class TransferSettings:
     contacts: bool = True
     rig: bool = False
     spelling: Spelling = "keep"
+    halves: bool = False
+    symmetric: bool = False
     evaluated: bool = False
     collisions: Literal["replace", "number"] = "number"
     textures: TextureSettings = field(default_factory=TextureSettings)

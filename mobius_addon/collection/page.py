@@ -12,6 +12,7 @@ from ...solver.collection import Collection
 from ...solver.collection.cycles import SUSPECT
 from ...solver.collection.shapes import Shapes
 from ...solver.surface.mesh import Floats, Integers, plural
+from .paths import draw_paths, short
 from .pictures import inline, thumbnail, view
 
 MOST_PICTURES = 120
@@ -26,6 +27,7 @@ LABELLED = 60
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1080px; padding: 0 1em; color: #222; }
 figure { margin: 1.2em 0; } figcaption { color: #555; margin-top: .4em; } svg { max-width: 100%; height: auto; }
+.wide { overflow: auto; max-height: 900px; } .wide svg { max-width: none; }
 .few { display: flex; flex-wrap: wrap; gap: 10px; } .few div { width: 140px; text-align: center; font-size: 12px; }
 .bad { color: #b3261e; } td, th { padding: .1em .8em .1em 0; text-align: left; } h2 { margin-top: 1.8em; }
 """
@@ -37,10 +39,12 @@ def page(collection: Collection, shapes: Shapes) -> str:
     pictures = _pictures(shapes)
     parts = [
         f"<p>{escape(_summary(collection))}</p>",
-        _figure("Paths", _paths(collection, pictures), _paths_caption(collection)),
+        _figure("Paths", draw_paths(collection, pictures, _suspects(collection)), _paths_caption(collection)),
         _figure(
             "Distances",
-            _matrix(collection.distances(), [collection.names[k] for k in order], order, _suspects(collection)),
+            _matrix(
+                collection.distances(), [short(collection.names[k], 24) for k in order], order, _suspects(collection)
+            ),
             "Continuous Procrustes distances, most alike beside each other; darker is nearer, and a dot marks a pair "
             "whose map is suspect. White: not aligned. The numbers are in distances.csv.",
         ),
@@ -74,67 +78,6 @@ def _summary(collection: Collection) -> str:
 
 def _figure(title: str, picture: str, caption: str) -> str:
     return f"<h2>{escape(title)}</h2><figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-# -- paths -------------------------------------------------------------------------------------------------------------
-
-
-def _paths(collection: Collection, pictures: dict[str, str]) -> str:
-    """Draw the tree that the paths from the root are, in rings around it."""
-    before = {path[-1]: path[-2] for path in collection.routes.values() if len(path) > 1}
-    children: dict[int, list[int]] = {}
-    for child, parent in sorted(before.items()):
-        children.setdefault(parent, []).append(child)
-    depth = max((len(path) - 1 for path in collection.routes.values()), default=0)
-    leaves: dict[int, int] = {}
-    for number in sorted(collection.routes, key=lambda k: -len(collection.routes[k])):
-        leaves[number] = sum(leaves[child] for child in children.get(number, ())) or 1
-    total = leaves[collection.root]
-    # rings wide enough for the pictures on the outermost
-    shown = len(collection.routes) <= LABELLED
-    side = 78 if shown else 0
-    ring = max(96.0 if shown else 40.0, 1.15 * side * total / (2 * np.pi * max(depth, 1)))
-    places: dict[int, complex] = {collection.root: 0j}
-    spans: dict[int, tuple[float, float]] = {collection.root: (0.0, 2 * np.pi)}
-    for number in sorted(collection.routes, key=lambda k: len(collection.routes[k])):
-        begin, end = spans[number]
-        for child in children.get(number, ()):
-            width = (end - begin) * leaves[child] / sum(leaves[x] for x in children[number])
-            spans[child] = begin, begin + width
-            angle = begin + width / 2
-            places[child] = ring * (len(collection.routes[child]) - 1) * complex(np.cos(angle), np.sin(angle))
-            begin += width
-    bad = _suspects(collection)
-    half = ring * depth + side
-    parts = []
-    for child, parent in before.items():
-        a, b = places[parent], places[child]
-        color = "#b3261e" if (min(child, parent), max(child, parent)) in bad else "#9aa0a6"
-        parts.append(
-            f'<line x1="{a.real:.1f}" y1="{a.imag:.1f}" x2="{b.real:.1f}" y2="{b.imag:.1f}" stroke="{color}" '
-            'stroke-width="2"/>'
-        )
-    for number, place in places.items():
-        name = collection.names[number]
-        if shown and name in pictures:
-            parts.append(
-                f'<circle cx="{place.real:.1f}" cy="{place.imag:.1f}" r="{side / 2:.1f}" fill="#fff"/>'
-                f'<image href="{pictures[name]}" x="{place.real - side / 2:.1f}" y="{place.imag - side / 2:.1f}" '
-                f'width="{side}" height="{side}"/>'
-            )
-        else:
-            parts.append(f'<circle cx="{place.real:.1f}" cy="{place.imag:.1f}" r="4" fill="#3b6ea5"/>')
-        if shown:
-            weight = ' font-weight="bold"' if number == collection.root else ""
-            parts.append(
-                f'<text x="{place.real:.1f}" y="{place.imag + side / 2 + 9:.1f}" font-size="12" text-anchor="middle" '
-                f'paint-order="stroke" stroke="#fff" stroke-width="4"{weight}>{escape(name)}</text>'
-            )
-    size = 2 * half + 24
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{-size / 2:.0f} {-size / 2:.0f} {size:.0f} {size:.0f}" '
-        f'width="{min(size, 1000):.0f}" font-family="system-ui, sans-serif">{"".join(parts)}</svg>'
-    )
 
 
 def _paths_caption(collection: Collection) -> str:
@@ -245,9 +188,8 @@ def _shown(collection: Collection, shapes: Shapes, pictures: dict[str, str]) -> 
             about.append(f"cycles {100 * errors[name]:.1f} %")
         if turned:
             about.append("mirrored")
-        parts.append(
-            f'<div><img src="{pictures[name]}" width="132" alt=""><br>{escape(name)}<br>{", ".join(about)}</div>'
-        )
+        label = f'<span title="{escape(name)}">{escape(short(name, 22))}</span>'
+        parts.append(f'<div><img src="{pictures[name]}" width="132" alt=""><br>{label}<br>{", ".join(about)}</div>')
     caption = (
         "All specimens on one topology, in one pose; equal colors are corresponding points. Certainty: the mean "
         "confidences along the path, multiplied. Cycles: how far from closed the three-cycles of its maps are."

@@ -20,6 +20,7 @@ class Progress:
         self.stage = ""
         self.begun = self.said = time.monotonic()
         self.width = 0
+        self.named: set[str] = set()
 
     def __call__(self, told: Told) -> None:
         """Say it, if it is time."""
@@ -29,6 +30,7 @@ class Progress:
             self.stage, self.begun = told.stage, now
             self.said = -OFTEN if self.terminal else now
         if told.error is not None:
+            self.named.add(told.name)
             self._clear()
             say_error(f"mobius: {told.name}: {told.error}")
         if now - self.said < (OFTEN if self.terminal else SELDOM):

@@ -159,6 +159,8 @@ def _write_blend(path: Path, common: Shapes) -> None:
         with quiet():
             bpy.ops.wm.save_as_mainfile(filepath=str(unfinished.resolve()), copy=True, check_existing=False)
         unfinished.replace(path)
+    except RuntimeError as error:  # Blender's word for what could not be written
+        raise OSError(f"'{path.name}' could not be saved") from error
     finally:
         unfinished.unlink(missing_ok=True)
 

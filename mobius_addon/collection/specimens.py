@@ -13,13 +13,15 @@ from ..files import FORMATS, READ_ONLY, Unreadable, import_mesh, new_scene, spli
 from ..mesh_data import read_surface
 
 
-def specimens(arguments: Iterable[str]) -> list[Specimen]:
+def specimens(arguments: Iterable[str], output: Path) -> list[Specimen]:
     """Return the specimens that FILE, FILE:OBJECT and FOLDER name; of a folder all mesh files right in it.
+
+    `output`: the folder of the results, which are none themselves.
 
     Raises
     ------
     Unreadable
-        There is no such file, or a folder without any mesh file; two would have one name.
+        There is no such file, or a folder without any mesh file; two would have one name; one lies among the results.
     """
     found: dict[str, Specimen] = {}
     said: dict[str, str] = {}
@@ -27,6 +29,8 @@ def specimens(arguments: Iterable[str]) -> list[Specimen]:
         path, wanted = split_object_name(argument)
         if not path.is_file():
             raise Unreadable(f"there is no file '{path}'")
+        if path.resolve().parent == output.resolve():
+            raise Unreadable(f"'{path}' lies where the results go, '{output}': choose another folder for one of them")
         name = free_name(path.stem if wanted is None else f"{path.stem} {wanted}")
         if name.casefold() in said:
             raise Unreadable(f"'{said[name.casefold()]}' and '{argument}' would both be called '{name}': rename one")

@@ -22,7 +22,10 @@ def add_pair_options(parser: argparse.ArgumentParser, several_targets: bool = Fa
     add_repair_options(repair)
     repair.add_argument("--source-outer", type=int, metavar="VERTEX", help=f"of the source: {OUTER_HELP}")
     repair.add_argument("--target-outer", type=int, metavar="VERTEX", help="the same of the target")
-    cut = "vertex group or attribute around the piece that is matched, such as a head; 'selection': selected"
+    cut = (
+        "vertex group or attribute around the piece that is matched, such as a head; 'selection': selected; 'seams': "
+        "cut open along marked seams"
+    )
     repair.add_argument("--source-cut", metavar="NAME", default="", help=f"of the source: {cut}")
     repair.add_argument("--target-cut", metavar="NAME", default="", help="the same of the target")
     repair.add_argument(
@@ -53,6 +56,16 @@ def _add_align_options(group: argparse._ArgumentGroup) -> None:
         help="known pairs, one on each line: two vertex numbers, or x y z on the source and x y z on the target in the "
         "axes and units of their files",
     )
+    group.add_argument(
+        "--pairs",
+        metavar="FILE",
+        type=Path,
+        help="corrections, as --landmarks has them: the finished map is bent through them, but for those that "
+        "contradict a map that is sure of itself",
+    )
+    group.add_argument(
+        "--follow-all", action="store_true", help="with --pairs: bend through those that contradict the map, too"
+    )
     group.add_argument("--samples", type=int, metavar="N", help="source points of the search")
     group.add_argument("--targets", type=int, metavar="N", help="target points of the search")
     group.add_argument("--radius", type=float, metavar="R", help="hyperbolic match radius, in (0, 1)")
@@ -65,6 +78,8 @@ def align_settings(options: argparse.Namespace) -> AlignSettings:
     from ...solver import AlignSettings
     from ..files import Unreadable
 
+    if options.follow_all and options.pairs is None:
+        raise Unreadable("--follow-all is about --pairs: give them")
     names = ("reflect", "refine", "take_rival", "samples", "targets", "radius", "z_max", "time_limit")
     names += ("parts", "fill_holes", "cut", "source_outer", "target_outer")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
                 surface = read_surface(imported.obj, name)
                 whole = verdict(surface.mesh, keys=surface.keys)
                 line = whole.describe()
-                if not whole.topology.is_closed and (badly := held(whole.tidy)):
+                if badly := held(whole.tidy):
                     line += f"; {badly.text}"
             except Unreadable as error:
                 say_error(f"mobius: {error}")

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     from ..files import Unreadable
     from ..mesh_data import Refusal
 
-    found = specimens(options.meshes)
+    found = specimens(options.meshes, options.output)
     if options.jobs is not None and options.jobs < 1:
         raise Unreadable(f"--jobs must be at least 1, not {options.jobs}")
     landmarks = _landmarks(options, [specimen.name for specimen in found])
@@ -82,15 +82,16 @@ def run(options: argparse.Namespace) -> int:
     progress = Progress()
     try:
         done = collect(found, options.output, opened, plan=plan, settings=settings, at_a_time=at_a_time, tell=progress)
+        warn(write_results(done, landmarks))
     except ValueError as error:
         raise Refusal(str(error)) from error
     except OSError as error:
-        raise Refusal(f"nothing can be written in '{options.output}': {error.strerror or error}") from error
+        why = f"cannot write in '{options.output}': {error.strerror or error}"
+        raise Refusal(f"{why}; once that is mended, the same command goes on from here") from error
     finally:
         progress.end()
         close()
-    warn(write_results(done, landmarks))
-    _say(done, options.output)
+    _say(done, options.output, progress.named)
     return NOT_ALIGNED if done.failures else DONE
 
 
@@ -123,15 +124,17 @@ def _landmarks(options: argparse.Namespace, names: list[str]) -> tuple[str, list
     return start, labels, places
 
 
-def _say(done: Collection, output: Path) -> None:
-    """Say what was found."""
+def _say(done: Collection, output: Path, named: set[str]) -> None:
+    """Say what was found; failures that are not `named` yet are of an earlier run."""
     for name, why in done.failures.items():
-        say_error(f"mobius: {name}: {why}")
+        if name not in named:
+            say_error(f"mobius: {name}: {why}")
     for (a, b), error, bad in zip(done.edges, done.errors, done.suspects, strict=True):
         if bad:
             say_error(f"mobius: warning: suspect: {done.names[a]} to {done.names[b]}, off by {error:.0%} in cycles")
     certified = sum(known.certified for known in done.figures)
+    failed = f", {len(done.failures):,} failed" if done.failures else ""
     say(
         f"{output}: {len(done.names):,} specimens, {len(done.edges):,} pairs, {certified:,} certified, "
-        f"{int(done.suspects.sum()):,} suspect; all on the topology of '{done.names[done.root]}'"
+        f"{int(done.suspects.sum()):,} suspect{failed}; all on the topology of '{done.names[done.root]}'"
     )

@@ -12,6 +12,7 @@ from .mesh_options import require_outer
 
 if TYPE_CHECKING:
     from ...solver import Alignment, AlignSettings, Correspondence, TriangleMesh
+    from ...solver.carry.pairs import PointPairs
     from ...solver.surface.mesh import Integers
     from ..files import Imported
     from ..mesh_data import Surface
@@ -62,6 +63,7 @@ def align_pair(
     require_outer(settings.source_outer, options, "--source-outer", source)
     require_outer(settings.target_outer, options, "--target-outer", target)
     pairs = _landmarks(options, files, (source.mesh, target.mesh))
+    corrections = _corrections(options, files, (source.mesh, target.mesh))
     alignment, correspondence = aligned(
         source.mesh,
         target.mesh,
@@ -75,7 +77,7 @@ def align_pair(
         say_error(f"mobius: warning: {warning}")
     say(summary(options.source, options.target, alignment, correspondence))
     say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
-    return alignment, correspondence
+    return alignment, _corrected(options, correspondence, (source.mesh, target.mesh), corrections)
 
 
 def require_something_to_write(options: argparse.Namespace) -> None:
@@ -94,7 +96,9 @@ def matched_pair(
 ) -> tuple[Alignment | None, Correspondence]:
     """Return the correspondence of two surfaces: of the map that was given, or of an alignment made for it."""
     if options.use_map:
-        return None, _fitting_map(options, surfaces)
+        meshes = surfaces[0].mesh, surfaces[1].mesh
+        corrections = _corrections(options, files, meshes)
+        return None, _corrected(options, _fitting_map(options, surfaces), meshes, corrections)
     return align_pair(options, files, surfaces, settings)
 
 
@@ -126,6 +130,42 @@ def _landmarks(
     for warning in warnings:
         say_error(f"mobius: warning: {warning}")
     return pairs
+
+
+def _corrections(
+    options: argparse.Namespace, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]
+) -> PointPairs | None:
+    """Return the pairs of points by which the map is to be corrected, if any, and say what is left out."""
+    from ...solver.carry.pairs import PointPairs
+    from ..files import read_point_pairs
+
+    if options.pairs is None:
+        return None
+    points, warnings = read_point_pairs(options.pairs, files, meshes)
+    for warning in warnings:
+        say_error(f"mobius: warning: {warning}")
+    return PointPairs.near(*meshes, *points)
+
+
+def _corrected(
+    options: argparse.Namespace,
+    found: Correspondence,
+    meshes: tuple[TriangleMesh, TriangleMesh],
+    pairs: PointPairs | None,
+) -> Correspondence:
+    """Return a map bent through pairs of points, if there are any, and say what came of it."""
+    from ...solver.carry.pairs import through_pairs
+    from ..point_pairs import describe
+
+    if pairs is None:
+        return found
+    bent = through_pairs(found, *meshes, pairs, follow_all=options.follow_all)
+    kind, said = describe([f"pair {k + 1}" for k in range(len(pairs.source_face))], bent)
+    if kind == "WARNING":
+        say_error(f"mobius: warning: {said}")
+    else:
+        say(said)
+    return bent.correspondence
 
 
 def _same_mesh(source: str, target: str) -> bool:

@@ -15,7 +15,7 @@ def one_by_one(options: argparse.Namespace) -> list[argparse.Namespace]:
     """
     from ..files import Unreadable, split_object_name
 
-    for name in ("use_map", "landmarks", "target_outer", "texture_map", "use_texture_map", "sheet"):
+    for name in ("use_map", "landmarks", "pairs", "target_outer", "texture_map", "use_texture_map", "sheet"):
         if getattr(options, name) is not None:
             raise Unreadable(f"--{name.replace('_', '-')} is about one target: give one, not {len(options.target)}")
     suffixes = {"output": ".blend", "map": ".npz", "report": ".json"}

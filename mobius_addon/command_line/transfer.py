@@ -11,6 +11,14 @@ from .align_options import add_pair_options, align_settings
 from .output_files import add_output_options, is_input, orders, require_writable, warn, write_report
 from .pair import matched_pair, opened_pair, read_pair, require_something_to_write
 from .several_targets import one_by_one
+from .surface_data import (
+    add_data_option,
+    carrier_of_data,
+    data_outputs,
+    plan_of_data,
+    read_data,
+    write_data,
+)
 from .transfer_options import add_texture_options, add_transfer_options, transfer_settings
 
 if TYPE_CHECKING:
@@ -37,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="draw source and target below each other with six of the shape keys",
     )
-    add_transfer_options(parser.add_argument_group("transfer"))
+    transfer = parser.add_argument_group("transfer")
+    add_transfer_options(transfer)
+    add_data_option(transfer)
     add_texture_options(parser.add_argument_group("textures"))
 
 
@@ -69,6 +79,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from ...solver import report, save_map
+    from ..attributes.reading import NothingThere
     from ..demo.pictures import require_cycles
     from ..files import Unreadable, outputs, write_mesh
     from ..files.pictures_beside import write_map, write_pictures
@@ -94,10 +105,20 @@ def _transfer_to(options: argparse.Namespace) -> None:
     with outputs() as written:
         with opened_pair(options, write=True) as (source, target, notes):
             surfaces = read_pair(options, source, target)
+            data = read_data(options, surfaces[0])
             alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
             keeps = options.texture_map is not None
-            reading = read_through(source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps)
-            plan = reading.carry()
+            carrier, unmatched = carrier_of_data(source, surfaces, correspondence, choices)
+            try:
+                reading = read_through(
+                    source.obj, target.obj, surfaces, correspondence, choices, keeps_texture_map=keeps
+                )
+                plan = reading.carry()
+            except NothingThere:
+                if not data:
+                    raise
+                plan = plan_of_data(unmatched)
+            write_data(data, carrier, options, target, written)
             plan.write(target.obj)
             if options.sheet:
                 keys = [(x.source_name, x.name) for x in plan.layers if x.row.kind == "shape-keys"]
@@ -120,7 +141,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
             }
             write_report(written.path(options.report), figures)
     warn([*notes, *plan.warnings, *lost, *order])
-    say(f"{options.output}: {describe_counts(plan.counts())} from {options.source}{plan.unmatched.remark()}")
+    counts = describe_counts(plan.counts() | ({"data": len(data)} if data else {}))
+    say(f"{options.output}: {counts} from {options.source}{plan.unmatched.remark()}")
 
 
 def _through_texture_map(options: argparse.Namespace, choices: TransferSettings) -> None:
@@ -153,10 +175,20 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
 def _require_writable(options: argparse.Namespace) -> None:
     from ..textures.images import turns_beside
 
-    inputs = [options.source, options.target, options.use_map, options.landmarks, options.use_texture_map]
+    inputs = [
+        options.source,
+        options.target,
+        options.use_map,
+        options.landmarks,
+        options.pairs,
+        options.use_texture_map,
+    ]
     beside = turns_beside(options.texture_map) if options.texture_map else None
     others = [options.map, options.report, options.texture_map, beside, options.sheet]
-    require_writable([options.output], others, inputs=inputs, overwrite=options.overwrite)
+    data = data_outputs(options)
+    # a folder of them that is not there yet is made
+    others += [path for path in data if path.parent.is_dir()]
+    require_writable([options.output], others, inputs=[*inputs, *options.data], overwrite=options.overwrite)
 
 
 def _listed(plan: Transfer) -> list[dict[str, str]]:

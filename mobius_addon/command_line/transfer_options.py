@@ -71,6 +71,17 @@ def add_transfer_options(group: argparse._ArgumentGroup) -> None:
         help="how known expressions are called: as on the source (default), eyeBlinkLeft, eyeBlink_L or eyeBlink.L",
     )
     group.add_argument(
+        "--split",
+        dest="halves",
+        action="store_true",
+        help="expressions that are one for both sides, as browInnerUp, become two, left and right",
+    )
+    group.add_argument(
+        "--symmetric",
+        action="store_true",
+        help="shape keys that are nearly symmetric, or nearly mirror images of each other, are so exactly",
+    )
+    group.add_argument(
         "--evaluated", action="store_true", help="the source as its modifiers and the mix of its shape keys show it"
     )
 
@@ -119,6 +130,7 @@ def transfer_settings(options: argparse.Namespace) -> TransferSettings:
 
     given = {"kinds": tuple(_kinds(options.only)), "evaluated": options.evaluated, "normalize": options.normalize}
     given |= {"deform_only": options.deform_only, "rig": options.rig}
+    given |= {"halves": options.halves, "symmetric": options.symmetric}
     if options.names is not None:
         given |= {"layers": "named", "names": split_names(options.names)}
     elif options.active:

@@ -33,6 +33,7 @@ def run(options: argparse.Namespace) -> int:
     from ...solver import report, save_map
     from ...solver.carry.fitted import in_shape_of, wrapped
     from ..files import outputs, write_mesh
+    from ..files.gifti import lies_where
     from ..fitting import reshaped_object, wrapped_object
     from ..mesh_data import Refusal
     from ..operators.wrap import remarks
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     require_writable(
         [options.output],
         [options.map, options.report],
-        inputs=[options.source, options.target, options.landmarks, options.use_map],
+        inputs=[options.source, options.target, options.landmarks, options.pairs, options.use_map],
         overwrite=options.overwrite,
     )
     with opened_pair(options, write=True) as (source, target, notes):
@@ -54,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
         except ValueError as error:
             raise Refusal(f"'{options.source}' and '{options.target}' cannot be fitted: {error}") from error
         made = make(source.obj, target.obj, surfaces[own], fitted)
+        lies_where(made.data, target.obj.data)
         order = orders(options.map, (source, target))
     with outputs() as written:
         lost = write_mesh(

@@ -1,7 +1,7 @@
 """Meshes in and out of files, through Blender's own importers and exporters."""
 
 from .formats import FORMATS, READ_ONLY, Format, format_of, split_object_name
-from .landmark_file import read_landmarks
+from .landmark_file import read_landmarks, read_point_pairs
 from .opening import Opened, opened
 from .publishing import Outputs, outputs, real_place, require_folder, require_place
 from .reading import Imported, chosen, import_mesh, import_meshes, new_scene, require_places
@@ -25,6 +25,7 @@ __all__ = [
     "opened",
     "outputs",
     "read_landmarks",
+    "read_point_pairs",
     "real_place",
     "require_folder",
     "require_place",

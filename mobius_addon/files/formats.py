@@ -116,6 +116,7 @@ FORMATS = {
     ".usda": _USD,
     ".usdc": _USD,
     ".usdz": _USD,
+    ".gii": Format(gifti.read, gifti.write),
 }
 
 
@@ -130,7 +131,6 @@ READ_ONLY = {
     ".vrm": ReadOnly(_GLTF.importer),  # a .glb with an avatar's rig described in it
     ".off": ReadOnly(off.read),
     ".vtk": ReadOnly(vtk.read),
-    ".gii": ReadOnly(gifti.read),
 }
 
 _OBJECT = re.compile(f"({'|'.join(map(re.escape, [*FORMATS, *READ_ONLY]))})(?P<colon>:)", re.IGNORECASE)
@@ -158,13 +158,15 @@ def format_of(path: Path) -> Format:
     Raises
     ------
     Unreadable
-        No such ending, or one of files that are only read.
+        No such ending, or one of files that are only read; or what writes it is not installed.
     """
     found = FORMATS.get(path.suffix.lower())
     if found is None and path.suffix.lower() in READ_ONLY:
         raise Unreadable(f"'{path}': {path.suffix} files are read, but not written: use one of {' '.join(FORMATS)}")
     if found is None:
         raise Unreadable(f"'{path}' has an ending that is not known: use one of {' '.join(FORMATS)}")
+    if path.suffix.lower() == ".gii":
+        gifti.nibabel_gifti(path, "written")  # said before any work
     return found
 
 

@@ -57,27 +57,53 @@ def read_landmarks(
     Unreadable
         It cannot be read, or is no such file; a vertex is not there; no landmark is left.
     """
+    found = _placed(path, files, meshes)
+    return np.stack(found.vertices, axis=1), found.warnings
+
+
+def read_point_pairs(
+    path: Path, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]
+) -> tuple[tuple[Floats, Floats], list[str]]:
+    """Return the points on the source and on the target, (l, 3) each, of such a file, and warnings.
+
+    As `read_landmarks`, but for points that stay where they are rather than go to the nearest vertex.
+    """
+    found = _placed(path, files, meshes)
+    return found.points, found.warnings
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """The pairs of a file that are on both surfaces: vertex numbers, (l,), and points, (l, 3), of each."""
+
+    vertices: tuple[Integers, Integers]
+    points: tuple[Floats, Floats]
+    warnings: list[str]
+
+
+def _placed(path: Path, files: tuple[Imported, Imported], meshes: tuple[TriangleMesh, TriangleMesh]) -> _Placed:
     pairs = _parse(path)
     warnings: list[str] = []
-    rows = np.full((len(pairs), 2), -1, np.intp)
+    rows = np.full((2, len(pairs)), -1, np.intp)
+    spots = np.full((2, len(pairs), 3), np.nan)
     for side, (imported, mesh) in enumerate(zip(files, meshes, strict=True)):
         numbered = [k for k, pair in enumerate(pairs) if pair.by_number]
         for k in numbered:
-            number = pairs[k].sides[side]
+            number = int(pairs[k].sides[side])
             if not 0 <= number < len(mesh.vertices):
                 raise Unreadable(
                     f"'{path}', line {pairs[k].line}: '{mesh.name}' has no vertex {number:,}: "
                     f"it has 0 to {len(mesh.vertices) - 1:,}"
                 )
-            rows[k, side] = number
+            rows[side, k], spots[side, k] = number, mesh.vertices[number]
         if numbered and (reason := imported.order_change()):
             warnings.append(f"'{path}' may count the vertices of '{imported.path}' otherwise: {reason}")
-        placed = [k for k, pair in enumerate(pairs) if not pair.by_number]
-        if placed:
+        placed = np.array([k for k, pair in enumerate(pairs) if not pair.by_number], np.intp)
+        if len(placed):
             points = np.array([pairs[k].sides[side] for k in placed])
-            vertices, off, remark = _on_surface(points, imported, mesh)
+            vertices, points, off, remark = _on_surface(points, imported, mesh)
             near = off <= FAR
-            rows[np.array(placed)[near], side] = vertices[near]
+            rows[side, placed[near]], spots[side, placed[near]] = vertices[near], points[near]
             warnings += [remark] if remark else []
             if not near.all():
                 lines = [f"{pairs[placed[k]].line} ({off[k]:.0%})" for k in np.flatnonzero(~near)]
@@ -85,13 +111,13 @@ def read_landmarks(
                     f"landmarks off '{mesh.name}' left out, by the line of '{path}' and how far, in % of the diagonal: "
                     + _few(lines)
                 )
-    kept = (rows >= 0).all(axis=1)
+    kept = (rows >= 0).all(axis=0)
     if not kept.any():
         raise Unreadable(
             f"no landmark of '{path}' is on both surfaces: give coordinates in the axes and units of the mesh files "
             f"({'; '.join(warnings)})"
         )
-    return rows[kept], warnings
+    return _Placed((rows[0, kept], rows[1, kept]), (spots[0, kept], spots[1, kept]), warnings)
 
 
 def _parse(path: Path) -> list[_Pair]:
@@ -122,8 +148,11 @@ def _parse(path: Path) -> list[_Pair]:
     return pairs
 
 
-def _on_surface(points: Floats, imported: Imported, mesh: TriangleMesh) -> tuple[Integers, Floats, str | None]:
-    """Return the nearest vertex in a face of each point, how far off the surface it is in diagonals, and a remark."""
+def _on_surface(points: Floats, imported: Imported, mesh: TriangleMesh) -> tuple[Integers, Floats, Floats, str | None]:
+    """Return the nearest vertex in a face of each point, where the mesh has the point, how far off, and a remark.
+
+    How far off the surface it is, is in diagonals.
+    """
     surface = SurfacePoints(mesh, (), 0.0)
     found = []
     for what, placed in imported.readings(points):
@@ -140,7 +169,7 @@ def _on_surface(points: Floats, imported: Imported, mesh: TriangleMesh) -> tuple
     used = np.unique(mesh.faces)
     vertices = used[KDTree(mesh.vertices[used]).query(placed)[1]]
     remark = f"most landmarks are on '{mesh.name}' only as {what}, and are taken so" if best else None
-    return vertices, off, remark
+    return vertices, placed, off, remark
 
 
 def _few(texts: list[str]) -> str:

@@ -11,7 +11,7 @@ from ...solver.carry.textures import exr_bytes
 from ..mesh_data import Refusal
 from ..textures.images import FIRST_TILE, tile_path, turns_beside
 from ..textures.made import Textures
-from ..textures.writing import PROPERTY
+from ..textures.marks import PROPERTY
 from .parts import numbered_stems
 from .publishing import Outputs, real_place
 

@@ -30,8 +30,10 @@ class Polygons:
     sizes: Integers
 
 
-def put_into_scene(polygons: Polygons, path: Path) -> None:
-    """Add an object, named like the file, with these polygons as they are: no axis is turned, nothing is scaled.
+def put_into_scene(polygons: Polygons, path: Path) -> bpy.types.Mesh:
+    """Add an object, named like the file, with these polygons as they are, and return its mesh.
+
+    No axis is turned, nothing is scaled.
 
     Raises
     ------
@@ -59,3 +61,4 @@ def put_into_scene(polygons: Polygons, path: Path) -> None:
     mesh.update(calc_edges=True)
     mesh.validate()
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(path.stem, mesh))
+    return mesh

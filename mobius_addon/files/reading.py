@@ -188,7 +188,10 @@ def choose(meshes: list[Imported], path: Path, wanted: str | None) -> Imported:
         own = [x for x in found if x.obj.library is None]
         found = own if len(own) == 1 else found
     if len(found) > 1:
-        raise Unreadable(f"'{path}' has {len(found)} mesh objects ({_listed(found)}): name one as {path}:NAME")
+        raise Unreadable(
+            f"'{path}' has {len(found)} mesh objects ({_listed(found)}): name one as {path}:NAME, "
+            "or join them in Blender (Ctrl J) to have all of them at once"
+        )
     require_places(found[0])
     return found[0]
 

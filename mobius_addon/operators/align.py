@@ -23,6 +23,7 @@ from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..translation import told
 from ..usable import by_uid, why_not_pair
+from ..verdict import verdict_sentence
 from . import side_by_side
 
 
@@ -116,7 +117,9 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, told(warning))
-        self.report({"INFO"}, summary(source.name, target.name, done.alignment, done.correspondence))
+        found = stored_alignment.figures(target)
+        if found is not None:
+            self.report({"INFO"}, verdict_sentence(bpy.context.scene, source, target, found))
 
 
 # a cache, never the truth: it can be emptied at any time. By fingerprints of both meshes and all that was asked; arrays

@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ... import solver
-from ...solver.surface.mesh import Booleans
+from ...solver.surface.tidy import Piece
 from .. import landmarks, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..comparison import is_copy
@@ -31,7 +31,7 @@ class _Target:
     surface: Surface
     settings: solver.AlignSettings
     pairs: Any
-    within: Booleans | None
+    within: Piece | None
 
 
 def selected_targets(context: bpy.types.Context) -> list[bpy.types.Object]:

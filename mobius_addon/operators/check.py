@@ -71,11 +71,10 @@ class MOBIUS_OT_check(bpy.types.Operator):
         else:
             line = f"'{obj.name}': {whole.describe()}"
             badly = None
-            if not whole.topology.is_closed:
-                try:
-                    badly = held(whole.tidy, fill_holes=asked.fill_holes)
-                except MeshError as error:
-                    badly = Held("", "cannot be aligned: it " + str(error).removeprefix(f"'{mesh.name}' "))
+            try:
+                badly = held(whole.tidy, fill_holes=asked.fill_holes)
+            except MeshError as error:
+                badly = Held("", "cannot be aligned: it " + str(error).removeprefix(f"'{mesh.name}' "))
             if badly:
                 self.report({"WARNING"}, f"{line}; {badly.text}")
                 return {"FINISHED"}

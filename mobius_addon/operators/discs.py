@@ -4,6 +4,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from .. import viewport
+from ..attributes import SHARED_LAYOUT
 from ..usable import why_not_aligned
 
 
@@ -20,6 +21,8 @@ class MOBIUS_OT_show_discs(bpy.types.Operator):
         reason = why_not_aligned(context, writes_target=False)
         if bpy.app.background:
             reason = rpt_("Blender runs without a window")
+        elif not reason and SHARED_LAYOUT not in context.scene.mobius.target.data.uv_layers:
+            reason = rpt_("Closed surfaces have no discs, or the shared layout was removed")
         if reason:
             cls.poll_message_set(reason)
         return not reason

@@ -7,6 +7,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Vector
 
+from .. import viewport
 from ..jobs import why_busy
 from ..usable import why_not_mode
 
@@ -49,6 +50,7 @@ class MOBIUS_OT_load_example(bpy.types.Operator):
         for obj in context.view_layer.objects:
             obj.select_set(obj in (source, target))
         context.view_layer.objects.active = source
+        viewport.look_at_selected(context)
         scene.mobius.source, scene.mobius.target = source, target
         self.report({"INFO"}, rpt_("'{}' and '{}' are chosen: press Align").format(source.name, target.name))
         return {"FINISHED"}

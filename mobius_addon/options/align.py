@@ -55,15 +55,17 @@ class AlignOptions:
     )
     source_cut: bpy.props.StringProperty(
         name="Cut Source To",
-        description="Vertex group or attribute around the piece of the source that is matched, such as a head; empty: "
-        "all of it, or where a body is too deep for a disc the piece that fits",
+        description="Vertex group or attribute around the piece of the source that is matched, such as a head; "
+        "'seams': cut open along marked seams; empty: all of it, or where a body is too deep for a disc the piece that "
+        "fits",
         search=nameable("source"),
         search_options={"SUGGESTION"},
     )
     target_cut: bpy.props.StringProperty(
         name="Cut Target To",
-        description="Vertex group or attribute around the piece of the target that is matched, such as a head; empty: "
-        "all of it, or where a body is too deep for a disc the piece that fits",
+        description="Vertex group or attribute around the piece of the target that is matched, such as a head; "
+        "'seams': cut open along marked seams; empty: all of it, or where a body is too deep for a disc the piece that "
+        "fits",
         search=nameable("target"),
         search_options={"SUGGESTION"},
     )

@@ -178,6 +178,17 @@ class TransferOptions(KindSwitches, SourceMaskOptions):
         ),
         default=_TRANSFER.spelling,
     )
+    halves: bpy.props.BoolProperty(
+        name="Split Sides",
+        description="Expressions that are one for both sides, as browInnerUp, become two, left and right",
+        default=_TRANSFER.halves,
+    )
+    symmetric: bpy.props.BoolProperty(
+        name="Symmetric",
+        description="Shape keys that are nearly symmetric, and such of left and right that are nearly mirror images of "
+        "each other, are so exactly, where the target is symmetric",
+        default=_TRANSFER.symmetric,
+    )
     evaluated: bpy.props.BoolProperty(
         name="Evaluated Source",
         description="Read the source as its modifiers and the current mix of its shape keys show it, instead of the "
@@ -240,7 +251,7 @@ def transfer_settings(options: Any) -> TransferSettings:
     kinds = tuple(kind.identifier for kind in KINDS if enum_identifier(kind.identifier) in options.kinds)
     receives = Mask(options.target_mask, options.target_mask_name, options.target_mask_invert)
     own = ("layers", "deform_only", "collisions", "mix", "mix_factor", "limit", "normalize", "smallest_weight")
-    own += ("unmatched", "keys_by", "contacts", "rig", "spelling", "evaluated")
+    own += ("unmatched", "keys_by", "contacts", "rig", "spelling", "halves", "symmetric", "evaluated")
     names = split_names(options.layer_names)
     masks = {"source_mask": source_mask(options), "target_mask": receives}
     textures = TextureSettings(

@@ -38,6 +38,8 @@ def draw_transfer(layout: bpy.types.UILayout, options: Any) -> None:
     column.prop(options, "keys_by")
     column.prop(options, "contacts")
     column.prop(options, "spelling")
+    column.prop(options, "halves")
+    column.prop(options, "symmetric")
     layout.column(heading="Source").prop(options, "evaluated", text="As Evaluated")
     if enum_identifier("textures") in options.kinds:
         column = layout.column(heading="Textures")

@@ -7,12 +7,14 @@ from .fitted import MOBIUS_PT_fitted
 from .last_transfer import MOBIUS_PT_last_transfer
 from .live import MOBIUS_PT_live
 from .main import MOBIUS_PT_main
+from .mending import MOBIUS_MT_mend
 from .pairs import MOBIUS_PT_pairs
 from .parts import MOBIUS_PT_parts
 from .proof import MOBIUS_PT_notes, MOBIUS_PT_proof
 from .result import MOBIUS_PT_result
 from .settings import MOBIUS_PT_alignment, MOBIUS_PT_scans
 from .show import MOBIUS_PT_pictures
+from .targets import MOBIUS_PT_targets
 from .transfer import MOBIUS_PT_transfer, MOBIUS_PT_transfer_settings
 
 
@@ -24,7 +26,9 @@ def _draw_in_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 _register, _unregister = bpy.utils.register_classes_factory(
     (
+        MOBIUS_MT_mend,
         MOBIUS_PT_main,
+        MOBIUS_PT_targets,
         MOBIUS_PT_result,
         MOBIUS_PT_proof,
         MOBIUS_PT_notes,

@@ -10,12 +10,13 @@ from ..operators.example import (
     MOBIUS_OT_load_example,
     MOBIUS_OT_remove_example,
 )
+from .place import beside_or_below
 
 
 def draw_help(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the guide's button, and that of the example while nothing is chosen or it is there."""
     settings = context.scene.mobius
-    row = layout.row(align=True)
+    row = beside_or_below(layout, context)
     row.operator(MOBIUS_OT_guide.bl_idname, icon="HELP")
     if COLLECTION in context.scene.collection.children:
         row.operator(MOBIUS_OT_remove_example.bl_idname, icon="TRASH")

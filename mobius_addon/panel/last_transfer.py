@@ -8,6 +8,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import last_transfer
 from ..attributes import KINDS
 from ..last_transfer import LastTransfer, LayerWritten
+from ..operators.try_expressions import MOBIUS_OT_try_expressions
+from ..playing import Play
 from .place import MobiusPanel, draw_wrapped
 
 _NAMES = 8
@@ -31,6 +33,8 @@ class MOBIUS_PT_last_transfer(MobiusPanel, bpy.types.Panel):
         if found is None:
             return
         layout.label(text=iface_("From '{}'").format(found.source), icon="CHECKMARK", translate=False)
+        if any(layer.kind == "shape-keys" for layer in found.layers):
+            layout.operator(MOBIUS_OT_try_expressions.bl_idname, icon="PLAY", depress=Play.current is not None)
         for kind in KINDS:
             layers = [layer for layer in found.layers if layer.kind == kind.identifier]
             if layers:

@@ -16,7 +16,8 @@ from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
 from ..usable import why_not
 from .help import draw_help
-from .place import MobiusPanel, draw_sentence, hand_on
+from .mending import draw_menu, draw_remedies
+from .place import MobiusPanel, beside_or_below, draw_sentence, draw_wrapped, hand_on
 
 
 class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
@@ -28,8 +29,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         """Draw the panel."""
         layout, settings = self.layout, context.scene.mobius
         _draw_picker(layout, context, "source")
-        row = layout.row()
-        row.alignment = "CENTER"
+        row = beside_or_below(layout, context)
         row.operator(MOBIUS_OT_swap.bl_idname, text="Swap", icon="FILE_REFRESH")
         row.operator(MOBIUS_OT_use_selected.bl_idname, icon="RESTRICT_SELECT_OFF")
         _draw_picker(layout, context, "target")
@@ -57,7 +57,7 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if obj is None:
         return
     if reason := why_not(obj, f"{role} mesh", context.scene, writes=False):
-        draw_sentence(column, reason, "ERROR")
+        draw_sentence(column, context, reason, "ERROR")
         return
     kept = preferences(context)
     if kept is not None and not kept.check_while_drawing:
@@ -68,12 +68,14 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     row = column.row(align=True)
     texts = row.column(align=True)
     for number, text in enumerate(line.rows):
-        texts.label(text=text, icon="BLANK1" if number else icon, translate=False)
+        draw_wrapped(texts, context, text, "BLANK1" if number else icon)
     if line.selectable:
         button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         button.object_name, button.edit = obj.name, True
+    draw_menu(row, obj, line)
     if line.remedy:
         column.prop(settings, line.remedy, toggle=True)
+    draw_remedies(column, obj, line)
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:

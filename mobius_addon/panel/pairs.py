@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import point_pairs, stored_alignment
+from .. import point_pairs
 from ..operators.align import MOBIUS_OT_align
 from ..operators.point_pairs import (
     MOBIUS_OT_add_pair,
@@ -14,20 +14,15 @@ from ..operators.point_pairs import (
     MOBIUS_OT_select_pair,
 )
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS
-from .place import MobiusSubPanel, hand_on
+from .place import AlignedPanel, hand_on
 
 
-class MOBIUS_PT_pairs(MobiusSubPanel, bpy.types.Panel):
+class MOBIUS_PT_pairs(AlignedPanel, bpy.types.Panel):
     """Correct the map by pairs of points."""
 
     bl_label = "Correct by Point Pairs"
     bl_order = 2
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where there is a map."""
-        return stored_alignment.pair(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the pairs, each with what became of it, and what can be done about them."""

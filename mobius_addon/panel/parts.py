@@ -7,25 +7,21 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import stored_alignment
-from .place import MobiusPanel
-from .result import MOBIUS_PT_result
+from .place import ReportPanel, report_of
 
 MOST_ROWS = 60
 """Parts that the panel lists: a head has up to 56, hair has hundreds of cards."""
 
 
-class MOBIUS_PT_parts(MobiusPanel, bpy.types.Panel):
+class MOBIUS_PT_parts(ReportPanel, bpy.types.Panel):
     """Which part of the target is which of the source."""
 
     bl_label = "Parts"
-    bl_parent_id = "MOBIUS_PT_result"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where an alignment is of meshes with several parts."""
-        return MOBIUS_PT_result.poll(context) and bool(_parts_of(context))
+    def has_something(cls, found: dict[str, Any]) -> bool:
+        """Return whether the meshes have several parts."""
+        return bool(found.get("parts"))
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw a row for each part."""
@@ -33,7 +29,7 @@ class MOBIUS_PT_parts(MobiusPanel, bpy.types.Panel):
         row = column.split(factor=0.5)
         row.label(text="Source")
         row.label(text="Target")
-        found = _parts_of(context)
+        found = (report_of(context) or {}).get("parts") or []
         for pair in found[:MOST_ROWS]:
             row = column.split(factor=0.5)
             for role in ("source", "target"):
@@ -42,9 +38,3 @@ class MOBIUS_PT_parts(MobiusPanel, bpy.types.Panel):
                 row.label(text=text, icon=icon if role == "source" else "NONE", translate=False)
         if len(found) > MOST_ROWS:
             column.label(text=iface_("and {} more, see the report").format(len(found) - MOST_ROWS), translate=False)
-
-
-def _parts_of(context: bpy.types.Context) -> list[dict[str, Any]]:
-    """Return the rows of the report about parts."""
-    found = stored_alignment.figures(context.scene.mobius.target)
-    return (found or {}).get("parts") or []

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
+
+from .. import stored_alignment
 
 
 class MobiusPanel:
@@ -22,22 +25,71 @@ class MobiusSubPanel(MobiusPanel):
     bl_parent_id = "MOBIUS_PT_main"
 
 
+class AlignedPanel(MobiusSubPanel):
+    """A part that is there once the chosen pair has been aligned."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where there is an alignment."""
+        return stored_alignment.pair(context) is not None
+
+
+class ReportPanel(MobiusPanel):
+    """A folded part of the result, about figures of its report."""
+
+    bl_parent_id = "MOBIUS_PT_result"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show where there is a report that says something of this."""
+        found = report_of(context)
+        return found is not None and cls.has_something(found)
+
+    @classmethod
+    def has_something(cls, _found: dict[str, Any]) -> bool:
+        """Return whether a report has anything for this part."""
+        return True
+
+
+def report_of(context: bpy.types.Context) -> dict[str, Any] | None:
+    """Return the report of the chosen pair's alignment; None if there is none, or none that can be read."""
+    pair = stored_alignment.pair(context)
+    return stored_alignment.figures(context.scene.mobius.target) if pair is not None else None
+
+
+def is_current(context: bpy.types.Context) -> bool:
+    """Return whether both meshes of the aligned pair are what was aligned."""
+    settings = context.scene.mobius
+    return stored_alignment.why_stale(settings.target, settings.source) is None
+
+
 def hand_on(names: Iterable[str], settings: bpy.types.PropertyGroup, operator: bpy.types.OperatorProperties) -> None:
     """Give a button's operator the scene's choices."""
     for name in names:
         setattr(operator, name, getattr(settings, name))
 
 
-def draw_sentence(layout: bpy.types.UILayout, sentence: str, icon: str) -> None:
+def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
     """Draw a sentence that may be too long for one row: what is wrong, then what to do about it."""
     for number, text in enumerate(sentence.split(": ", 1)):
-        layout.label(text=text, icon="BLANK1" if number else icon, translate=False)
+        draw_wrapped(layout, context, text, "BLANK1" if number else icon)
 
 
 def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
     """Draw a sentence in as many rows as the region's width needs."""
-    # a letter of Blender's font is 7 pixels wide on average, times the scale, and the icon takes five of them
-    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
-    letters = max(20, int((context.region.width if context.region is not None else 300) / (7 * scale)) - 5)
+    # a letter of Blender's font is 6 pixels wide on average; tabs, margins and the icon take 80
+    letters = max(16, int((_width(context) - 80) / 6.2))
     for number, row in enumerate(textwrap.wrap(sentence, letters)):
         layout.label(text=row, icon="BLANK1" if number else icon, translate=False)
+
+
+def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
+    """Return a row for two buttons or, in a narrow sidebar, a column."""
+    return layout.row(align=True) if _width(context) >= 260 else layout.column(align=True)
+
+
+def _width(context: bpy.types.Context) -> float:
+    """Return the region's width in pixels of a scale of 1."""
+    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
+    return (context.region.width if context.region is not None else 300) / scale

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
-from .. import stored_alignment
 from ..proof import TERMS, shown
-from .place import MobiusPanel, draw_wrapped
-from .result import MOBIUS_PT_result
-from .verdict import judgement_of
+from ..verdict import judgement_of
+from .place import ReportPanel, draw_wrapped, report_of
 
 
-class MOBIUS_PT_proof(MobiusPanel, bpy.types.Panel):
+class MOBIUS_PT_proof(ReportPanel, bpy.types.Panel):
     """What is proved about the result."""
 
     bl_label = "Proof"
-    bl_parent_id = "MOBIUS_PT_result"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where there is a result that can be read."""
-        return MOBIUS_PT_result.poll(context) and stored_alignment.figures(context.scene.mobius.target) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw each term; the tooltips say what they mean."""
@@ -34,20 +27,17 @@ class MOBIUS_PT_proof(MobiusPanel, bpy.types.Panel):
                 column.prop(settings.proof, term)
 
 
-class MOBIUS_PT_notes(MobiusPanel, bpy.types.Panel):
+class MOBIUS_PT_notes(ReportPanel, bpy.types.Panel):
     """What was done to the meshes for the computation, which changed nothing of them."""
 
     bl_label = "Done for the Computation"
-    bl_parent_id = "MOBIUS_PT_result"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where anything was done."""
-        found = stored_alignment.figures(context.scene.mobius.target) if MOBIUS_PT_result.poll(context) else None
-        return found is not None and bool(judgement_of(found).notes)
+    def has_something(cls, found: dict[str, Any]) -> bool:
+        """Return whether anything was done."""
+        return bool(judgement_of(found).notes)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the sentences."""
-        for sentence in judgement_of(stored_alignment.figures(context.scene.mobius.target) or {}).notes:
+        for sentence in judgement_of(report_of(context) or {}).notes:
             draw_wrapped(self.layout.column(align=True), context, sentence, "DOT")

@@ -9,21 +9,17 @@ from ..comparison import is_shown
 from ..operators.align import MOBIUS_OT_align
 from ..operators.side_by_side import MOBIUS_OT_end_side_by_side, MOBIUS_OT_side_by_side
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS
-from .place import MobiusSubPanel, draw_wrapped, hand_on
+from ..verdict import judgement_of
+from .place import AlignedPanel, draw_wrapped, hand_on
 from .remedies import draw_concerns
-from .verdict import draw_verdict, judgement_of
+from .verdict import draw_verdict
 
 
-class MOBIUS_PT_result(MobiusSubPanel, bpy.types.Panel):
+class MOBIUS_PT_result(AlignedPanel, bpy.types.Panel):
     """Whether the last alignment of the chosen pair can be believed."""
 
     bl_label = "Result"
     bl_order = 1
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where there is one."""
-        return stored_alignment.pair(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the verdict, and every warning with its remedy."""

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import bpy
 
-from .. import stored_alignment
 from ..heat_maps import MAP_MEASURES
 from ..operators.clear import MOBIUS_OT_clear
 from ..operators.discs import MOBIUS_OT_show_discs
 from ..operators.heat_map import MOBIUS_OT_heat_map
 from ..preferences import preferences
-from .place import MobiusSubPanel
+from .place import AlignedPanel, is_current
 
 
-class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
+class MOBIUS_PT_pictures(AlignedPanel, bpy.types.Panel):
     """See what the alignment is worth."""
 
     bl_label = "Show"
     bl_order = 3
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Show where there is an alignment."""
-        return stored_alignment.pair(context) is not None
-
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the switches and buttons."""
-        layout, view, settings = self.layout, context.window_manager.mobius_view, context.scene.mobius
-        layout.enabled = stored_alignment.why_stale(settings.target, settings.source) is None
+        layout, view = self.layout, context.window_manager.mobius_view
+        layout.enabled = is_current(context)
         column = layout.column()
         column.prop(view, "matches")
         if view.matches:
@@ -46,5 +40,7 @@ class MOBIUS_PT_pictures(MobiusSubPanel, bpy.types.Panel):
             row.operator(MOBIUS_OT_heat_map.bl_idname, text=measure.label).measure = measure.identifier
         layout.prop(view, "legend")
         if (kept := preferences(context)) is not None:
-            layout.prop(kept, "after_align")
+            column = layout.column(align=True)
+            column.label(text="After Align")
+            column.prop(kept, "after_align", text="")
         layout.operator(MOBIUS_OT_clear.bl_idname, icon="TRASH")

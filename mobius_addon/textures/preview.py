@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ..mesh_data import Refusal
-from .writing import PROPERTY, made_or_removed, write_textures
+from .marks import PREVIEW_OF
+from .writing import made_or_removed, write_textures
 
 if TYPE_CHECKING:
     from ..attributes import Transfer, TransferSettings
 
 SIZE = 1024
 """Side of the pictures of a preview at most, in texels: as many as half of a large window shows."""
-
-PREVIEW_OF = "mobius_preview_of"
-"""Custom property of the mesh of a copy that shows a preview: the name of the target's."""
 
 
 def preview_settings(settings: TransferSettings) -> TransferSettings | None:
@@ -50,22 +48,3 @@ def show_preview(copy: bpy.types.Object, plan: Transfer) -> bool:
         bpy.data.meshes.remove(own)
         raise
     return True
-
-
-def is_preview_of(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Return whether a mesh is that of a preview for the target's mesh of this name."""
-    return mesh.get(PREVIEW_OF) == name
-
-
-def remove_preview(mesh: bpy.types.Mesh) -> None:
-    """Remove the mesh of a copy that is gone, if it was a preview's own, with its material and pictures."""
-    if PREVIEW_OF not in mesh or mesh.users:
-        return
-    materials = [x for x in mesh.materials if x is not None and PROPERTY in x]
-    bpy.data.meshes.remove(mesh)
-    for material in materials:
-        images = {x.image for x in material.node_tree.nodes if x.type == "TEX_IMAGE" and x.image is not None}
-        bpy.data.materials.remove(material)
-        for image in images:
-            if PROPERTY in image and not image.users:
-                bpy.data.images.remove(image)

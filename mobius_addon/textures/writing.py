@@ -14,10 +14,8 @@ from ..mesh_data import Refusal, foreach
 from .images import new_image
 from .layouts import rendered_uv
 from .made import DATA, Made, Textures
+from .marks import PROPERTY
 from .nodes import shader_of
-
-PROPERTY = "mobius_textures"
-"""Custom property of materials and images that a transfer has made."""
 
 MASK = "Unmatched"
 

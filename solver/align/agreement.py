@@ -99,7 +99,7 @@ def trust(
     used = np.flatnonzero(target.mesh.used)
     carried = target.domain.nowhere(len(target.places))
     carried[used] = mobius.inverse()(target.places[used])
-    face, barycentric = source.domain.triangulated(source.places, source.mesh.faces).locate(carried[used])
+    face, barycentric = source.triangles.locate(carried[used])
     distance = descriptor_distance(source, source_descriptors, target_descriptors[used], face, barycentric)
     agreement = np.exp(-(distance**2) / (2 * scale**2))
     stretch = log_stretch(source, target, carried, face, barycentric, used)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -99,8 +100,11 @@ class Alignment:
 
     @property
     def margin(self) -> float | None:
-        """By how much of the samples the chosen orientation beat the other; None if only one was searched."""
-        return None if self.other is None else (self.search.value - self.other.value) / len(self.source_samples)
+        """By how much of the samples the chosen orientation beat the other, at least; None if only one was searched."""
+        if self.other is None:
+            return None
+        most = self.other.value if self.other.out_of_time else self.other.upper_bound
+        return (self.search.value - most) / len(self.source_samples)
 
     @property
     def rival_margin(self) -> float | None:
@@ -111,6 +115,13 @@ class Alignment:
         if self.rival is None or self.rival.out_of_time or self.search.out_of_time:
             return None
         return (self.search.value - self.rival.upper_bound) / len(self.source_samples)
+
+    def annotated(self, **said: Any) -> Alignment:
+        """Return it with other `seconds`, `remarks`, `causes` or `whole`; what is known of the map is kept."""
+        same = replace(self, **said)
+        kept = ("matched_weights", "difference", "carried", "evidence", "confidence", "located")
+        same.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
+        return same
 
     @property
     def value(self) -> float:
@@ -231,8 +242,7 @@ class Alignment:
         face, barycentric = np.full(size, -1), np.zeros((size, 3))
         if self.overlap is None:
             used = np.flatnonzero(self.target.mesh.used)
-            disc = self.source.domain.triangulated(self.source.places, self.source.mesh.faces)
-            face[used], barycentric[used] = disc.locate(self.carried[used])
+            face[used], barycentric[used] = self.source.triangles.locate(self.carried[used])
             return face, barycentric
         parts = self.overlap
         inner, weights = parts.alignment.located

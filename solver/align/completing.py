@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..surface.mesh import Floats, Integers, TriangleMesh
-from ..surface.nearest import SurfacePoints
+from ..surface.mesh import Floats, Integers
 from ..surface.parts import Part, Parts
 from .alignment import Alignment
 from .confidence import BOUND
 from .counterparts import assigned, certainty_of, costs
 from .part_map import PartMap, part_maps
+from .riding import Known, ride
 from .space import MOST_POINTS, Similarities, SpaceMap
 from .whole import Pair, Whole
 
@@ -28,9 +28,6 @@ a tooth, and one that is farther off than most, as a tongue, is still found."""
 LEAST = 0.25
 """Least of that deviation, in `BOUND`: three of them are less than from tooth to tooth, 2 % of a head's diagonal, and
 that is four times what those of two good heads are off."""
-
-STIFF = 0.1
-"""Extent, in diagonals, below which a part that rides along does so as one piece: buttons and teeth are not bent."""
 
 
 def completed(
@@ -222,42 +219,10 @@ def _confidence(own: PartMap, work: _Work, number: int) -> Floats:
 
 
 def _ride(work: _Work, main: _Main, face: Integers, barycentric: Floats, leader: Integers) -> None:
-    """Give the vertices of parts without a counterpart the point of the nearest surface that has one, (n,) arrays."""
-    target, source = work.target, work.source
-    riding = np.setdiff1d(np.arange(1, len(target)), work.pairs[:, 1])
+    """Give the vertices of parts without a counterpart the point of what they ride with, (n,) arrays."""
     known_face, known_place = face.copy(), barycentric.copy()
     known_face[main.vertices], known_place[main.vertices] = main.face, main.barycentric
-    rows = np.flatnonzero((known_face[target.mesh.faces] >= 0).all(axis=1) & (target.of_face >= 0))
-    if not len(riding) or not len(rows):
-        return
-    places, vertices = _riders(work, riding)
-    surface = SurfacePoints(TriangleMesh(target.mesh.vertices, target.mesh.faces[rows]), (), 0.0)
-    at, weights = surface.nearest_point(places, np.zeros_like(places))
-    corner = surface.mesh.faces[at]
-    nearest = corner[np.arange(len(at)), weights.argmax(axis=1)]
-    # the point between the places of three vertices, in the part of the source that these lie in
-    mesh = source.mesh
-    there = np.einsum("qkj,qkjd->qkd", known_place[corner], mesh.vertices[mesh.faces[known_face[corner]]])
-    point = np.einsum("qk,qkd->qd", weights, there)
-    part_of = source.of_face[known_face[nearest]]
-    for one in np.unique(part_of):
-        mine = np.flatnonzero(part_of == one)
-        faces = np.flatnonzero(source.of_face == one)
-        own = SurfacePoints(TriangleMesh(mesh.vertices, mesh.faces[faces]), (), 0.0)
-        found, where = own.nearest_point(point[mine], np.zeros_like(point[mine]))
-        face[vertices[mine]], barycentric[vertices[mine]] = faces[found], where
-    leader[vertices] = nearest
-
-
-def _riders(work: _Work, riding: Integers) -> tuple[Floats, Integers]:
-    """Return the vertices of the parts that ride along, (q,), and the place at which each holds on, (q, 3)."""
-    places, vertices = [np.empty((0, 3))], [np.empty(0, np.intp)]
-    for number in riding:
-        part = work.target.part(number)
-        local, own = _first(part, work.target, number)
-        here = part.mesh.vertices[local]
-        if float(np.linalg.norm(np.ptp(part.mesh.vertices, axis=0))) < STIFF * work.main_size:
-            here = np.broadcast_to(work.target.moments[0][number], here.shape)
-        places.append(here)
-        vertices.append(own)
-    return np.concatenate(places), np.concatenate(vertices)
+    known = Known(known_face, known_place, work.pairs, work.space_at, work.main_size, BOUND * work.diagonal)
+    if (found := ride(known, work.source, work.target)) is not None:
+        rows = found.vertices
+        face[rows], barycentric[rows], leader[rows] = found.face, found.barycentric, found.leader

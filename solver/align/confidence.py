@@ -118,7 +118,7 @@ def evidence(
     if bending is not None:
         mobius, above, unfolded = bending
         start = mobius.inverse()(target.places[used])
-        there, weights = source.domain.triangulated(source.places, faces).locate(start)
+        there, weights = source.triangles.locate(start)
         moved = np.linalg.norm(np.einsum("qk,qkd->qd", weights, vertices[faces[there]]) - places, axis=1) / root
         offset = above[used]
     return np.stack(

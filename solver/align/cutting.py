@@ -26,9 +26,10 @@ from .reconsider import UNLIKE, unlike
 from .remark import Remark
 from .settings import AlignSettings
 
-SHRUNK, MUCH = 1e-6, 0.25
-"""A surface is too deep for a disc where this share of its area shrinks there to less than this, beside the average: of
-bodies with a hole in the foot or the crown 0.5 to 0.8 does, of hands, the deepest that are aligned well whole, 0.13."""
+SHRUNK, MUCH = 1e-6, 0.2
+"""A surface is too deep for a disc or sphere where this share of its area shrinks there to less than this, beside the
+average: of bodies with a hole in the foot or the crown 0.5 to 0.8 does, of closed ones on the sphere 0.24 and 0.26, of
+hands, the deepest that are aligned well whole, 0.13."""
 
 TRIED = 4
 """Pieces that are tried beside the other surface, those most alike in their distances first: of two heads beside a body
@@ -84,15 +85,14 @@ def _why_cut(surface: Surface) -> str | None:
 
 
 def shrunk(flattening: Flat) -> float:
-    """Return the share of a surface's area that is smaller in the disc than `SHRUNK` times what it would be evenly.
-
-    0 on the sphere, which refuses by itself what has no room there.
-    """
+    """Return the share of a surface's area that is smaller in its disc or sphere than `SHRUNK` times evenly."""
     mesh = flattening.mesh
-    if not isinstance(flattening, Flattening):
-        return 0.0
-    scale = signed_areas(flattening.disc, mesh.faces) / np.maximum(mesh.face_areas, np.finfo(float).tiny)
-    return float(mesh.face_areas[scale < SHRUNK * np.pi / mesh.area].sum() / mesh.area)
+    if isinstance(flattening, Flattening):
+        there, whole = signed_areas(flattening.disc, mesh.faces), np.pi
+    else:
+        there, whole = TriangleMesh(np.nan_to_num(flattening.places), mesh.faces).face_areas, 4 * np.pi
+    scale = there / np.maximum(mesh.face_areas, np.finfo(float).tiny)
+    return float(mesh.face_areas[scale < SHRUNK * whole / mesh.area].sum() / mesh.area)
 
 
 def _piece_like(

@@ -35,6 +35,16 @@ def coarse(found: Alignment) -> Remark | None:
     return Remark("coarse", f"'{name}' is coarse, with {count} vertices inside to tell its shape: subdivide it")
 
 
+def deep(surface: Surface) -> Remark | None:
+    """Return that much of a surface shrinks to nothing in its disc or on its sphere, if it does."""
+    share = shrunk(surface.flattening)
+    if share <= MUCH:
+        return None
+    where = "on a sphere" if surface.flattening.domain.closed else "in a disc"
+    said = f"'{surface.original.name}' is deep, {share:.0%} of it has hardly any room {where}"
+    return Remark("deep", f"{said}: cut out what is to be matched")
+
+
 def causes(found: Alignment, source: Surface, target: Surface) -> tuple[Remark, ...]:
     """Return what may be the reason that a map is doubtful, the likeliest first; nothing where none is known.
 
@@ -79,11 +89,10 @@ def _of_surface(surface: Surface) -> list[Remark]:
     for done, (kind, text) in MENDED.items():
         if any(done in said for said in surface.cleaned.changes):
             result.append(Remark(kind, f"'{name}' {text}"))
-    if surface.mesh is not surface.cleaned.mesh:
-        result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     if surface.flattening.rim_lost > LITTLE:
         result.append(Remark("narrow", f"'{name}' is long and narrow: cut it into shorter pieces"))
-    elif (share := shrunk(surface.flattening)) > MUCH:
-        text = f"'{name}' is deep, {share:.0%} of it has hardly any room in a disc: cut out what is to be matched"
-        result.append(Remark("deep", text))
+    elif (cause := deep(surface)) is not None:
+        result.append(cause)
+    if surface.mesh is not surface.cleaned.mesh:
+        result.append(Remark("rough", f"'{name}' is rough or noisy: smooth or remesh it"))
     return result

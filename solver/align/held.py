@@ -20,7 +20,7 @@ class Held:
     Attributes
     ----------
     kind : str
-        "narrow", "deep" or "too deep", as in `diagnosis.Cause`.
+        "narrow", "deep" or "too deep", as in `remark.Kind`.
     text : str
         The rest of a sentence about the mesh: what it is, and after a colon what to do about it.
     """
@@ -42,6 +42,10 @@ def held(tidy: Cleaned, *, fill_holes: bool = True) -> Held | None:
     except MeshError:
         if not necks(tidy.mesh):
             raise
+        if (tidy.mesh.twins >= 0).all():
+            return Held(
+                "too deep", "juts out too far for a sphere: beside an open surface a piece that fits it is cut out"
+            )
         return Held("too deep", "too deep for one disc: a piece that fits the other surface is cut out, if it has one")
     if found.domain.closed:
         return None

@@ -11,17 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
+from ..search.both_sides import search_both
 from ..search.branch_and_bound import SearchResult, search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
-from ..search.rival import Rival, best_rival, scored
+from ..search.rival import LOOKED_AT, Rival, best_rival, scored
 from ..search.sphere_rival import best_sphere_rival, scored_on_sphere
 from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
 from ..surface.mesh import Floats, Integers, MeshError, Places
 from .alignment import Alignment
 from .landmarks import usable_landmarks, with_landmarks
-from .objective import compatibility, covering_radius
+from .objective import compatibility
 from .prepared import Surface
 from .refine import refined
 from .remark import Remark
@@ -62,7 +63,7 @@ def searched(
     problem = Objective(
         source.places[source_samples],
         target.places[target_samples],
-        covering_radius(target.places[target_samples])
+        target_surface.target_radii(settings.targets)
         if settings.radius is None
         else np.full(len(target_samples), settings.radius),
         compatibility(source_descriptors[source_samples], target_descriptors[target_samples], settings.compatible),
@@ -145,6 +146,7 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
         known,
         z_max=found.settings.z_max,
         enough=enough,
+        at_least=LOOKED_AT if _thorough(found.settings) else 0,
         time_limit=found.settings.time_limit,
         threads=found.settings.threads,
         progress=clock.searching(0.15),
@@ -187,6 +189,19 @@ def _both_sides(
     problem: Objective, settings: AlignSettings, clock: Part
 ) -> tuple[SearchResult, SearchResult | None, list[Remark]]:
     """Search the orientations that the settings ask for; return the one to take, the other, and what is to be said."""
+    if settings.reflect == "auto" and not _thorough(settings):
+        clock.begin("search", "Searching", 0.4)
+        plain, turned = search_both(
+            problem,
+            z_max=settings.z_max,
+            margin=settings.reflect_margin * len(problem.source),
+            time_limit=settings.time_limit,
+            threads=settings.threads,
+            progress=clock.searching(0.35),
+        )
+        if plain.cancelled:
+            raise Cancelled
+        return _decided(plain, _mirrored(turned), problem, settings)
     results: dict[bool, SearchResult] = {}
     sides = {"never": [False], "always": [True], "auto": [False, True]}[settings.reflect]
     for position, reflected in enumerate(sides):
@@ -211,10 +226,21 @@ def _both_sides(
         results[reflected] = _mirrored(result) if reflected else result
     if len(results) == 1:
         return results[sides[0]], None, []
-    advantage = (results[True].value - results[False].value) / len(problem.source)
+    return _decided(results[False], results[True], problem, settings)
+
+
+def _thorough(settings: AlignSettings) -> bool:
+    return settings.thorough or settings.refine == "dense"
+
+
+def _decided(
+    plain: SearchResult, turned: SearchResult, problem: Objective, settings: AlignSettings
+) -> tuple[SearchResult, SearchResult, list[Remark]]:
+    """Return the orientation to take, the other, and that they are hardly apart, if they are."""
+    advantage = (turned.value - plain.value) / len(problem.source)
     chosen = advantage > settings.reflect_margin
     said = tied_orientations(advantage) if abs(advantage) <= settings.reflect_margin else []
-    return results[chosen], results[not chosen], said
+    return (turned, plain, said) if chosen else (plain, turned, said)
 
 
 def _mirrored(result: SearchResult) -> SearchResult:

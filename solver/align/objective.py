@@ -43,7 +43,8 @@ def covering_radius(points: Places) -> Floats:
         distance = np.linalg.norm(points[:, None] - points, axis=2)
     else:
         distance = hyperbolic_distance(points[:, None], points)
-    return np.clip(np.sort(distance, axis=1)[:, min(2, len(points) - 1)], 1e-6, 0.5)
+    nth = min(2, len(points) - 1)
+    return np.clip(np.partition(distance, nth, axis=1)[:, nth], 1e-6, 0.5)
 
 
 def interior(flattening: Flat) -> Booleans:

@@ -14,12 +14,13 @@ from .completing import completed
 from .confidence import BOUND
 from .cutting import fitting_pieces
 from .dense import bent_densely, drafted_from
-from .diagnosis import causes, coarse
+from .diagnosis import causes, coarse, deep
 from .inside_out import turned_round
 from .landmarks import own_landmarks
 from .lips import with_lips_joined
 from .main_parts import other_mains
 from .mobius_map import roughly_aligned
+from .other_rim import with_other_rim
 from .prepared import Surface
 from .reconsider import DOUBTFUL, FITS, reconsidered
 from .remark import Remark
@@ -71,7 +72,7 @@ def align(
     others = found.whole is not None
     first = [one for surface in used for one in surface.remarks(other_parts=others)]
     first += found.whole.remarks if found.whole else ()
-    found = replace(found, seconds=clock.seconds, remarks=(*first, *found.remarks))
+    found = found.annotated(seconds=clock.seconds, remarks=(*first, *found.remarks))
     return _with_doubts(found, used)
 
 
@@ -82,16 +83,17 @@ def _with_doubts(found: Alignment, used: _Both) -> Alignment:
         known = causes(found, *used)
         likely = (replace(cause, before="doubtful, perhaps because ") for cause in known)
         doubt = Remark("doubtful", said)
-        return replace(found, remarks=(*found.remarks, doubt, *likely), causes=tuple(one.kind for one in known))
+        return found.annotated(remarks=(*found.remarks, doubt, *likely), causes=tuple(one.kind for one in known))
     apart = any(one.kind == "partial" for one in found.remarks)
     if apart and max(found.mean_confidence, found.bent_confidence) < FITS:
         said = (
             "unsure: what the surfaces have in common fits less well than it should, so what is said to be missing may "
             "only be stretched: look along its edge, or mark points there"
         )
-        found = replace(found, remarks=(*found.remarks, Remark("unsure", said)))
-    cause = coarse(found)
-    return found if cause is None else replace(found, remarks=(*found.remarks, cause), causes=(cause.kind,))
+        found = found.annotated(remarks=(*found.remarks, Remark("unsure", said)))
+    known = [coarse(found), *(map(deep, used) if found.mean_confidence < FITS else ())]
+    told = tuple(cause for cause in known if cause is not None)
+    return found.annotated(remarks=(*found.remarks, *told), causes=tuple(cause.kind for cause in told))
 
 
 _Both = tuple[Surface, Surface]
@@ -145,12 +147,15 @@ def _of_main_parts(
         part = clock.part(0.45, 0.95)
         first = drafted_from(matched, part)
         found = bent_densely(matched, first, part, pairs)
-        other = turned_round(found, source, target, clock.part(0.95, 0.97), pairs)
+        other = turned_round(found, source, target, clock.part(0.95, 0.96), pairs)
+        rim = None if other else with_other_rim(found, source, target, clock.part(0.96, 0.97), pairs)
         if other is not None:
             found, target = other
+        elif rim is not None:
+            found, source, target = rim
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
-    return replace(found, remarks=(*joined, *said, *found.remarks)), (source, target)
+    return found.annotated(remarks=(*joined, *said, *found.remarks)), (source, target)
 
 
 def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock: Part) -> Alignment:
@@ -158,7 +163,7 @@ def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock:
     if found.settings.parts == "main" or not (source.largest_part and target.largest_part):
         return found
     clock.begin("parts", "Pairing parts", 0.0)
-    return replace(found, whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
+    return found.annotated(whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
 
 
 def _surface(mesh: TriangleMesh | Surface, settings: AlignSettings, outer_vertex: int | None) -> Surface:

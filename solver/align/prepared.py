@@ -21,10 +21,10 @@ from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, 
 from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
 from ..surface.statistics import standardised
-from ..surface.tidy import Cleaned, piece_within
+from ..surface.tidy import Cleaned, Piece, piece_within
 from ..surface.topology import topology
 from ..surface.verdict import closing
-from .objective import interior, source_points
+from .objective import covering_radius, interior, source_points
 from .remark import Remark
 from .settings import AlignSettings
 
@@ -56,8 +56,9 @@ class Surface:
         Further coordinates of the vertices; see `surface.cleaned`.
     tidy : Cleaned or None
         The mesh in order, if it is already.
-    within : (n,) bool or None
-        Vertices among which the piece lies that is to be used; None: all of the mesh is.
+    within : (n,) bool, (k, 2) int or None
+        Vertices among which the piece lies that is to be used, or edges along which the mesh is cut open, its largest
+        piece being used; None: all of the mesh is.
     measured : (n, d) float64 or None
         The descriptors, once they are there.
     points : dict of str to dict of int to (k,) int
@@ -73,13 +74,14 @@ class Surface:
         largest_part: bool = False,
         keys: Floats | None = None,
         tidy: Cleaned | None = None,
-        within: Booleans | None = None,
+        within: Piece | None = None,
     ) -> None:
         self.original = original
         self.fill_holes, self.outer_vertex, self.largest_part = fill_holes, outer_vertex, largest_part
         self.keys, self.tidy, self.within = keys, tidy, within
         self.measured: Floats | None = None
         self.points: dict[str, dict[int, Integers]] = {"source": {}, "target": {}}
+        self._radii: dict[int, Floats] = {}
 
     def known(self, flattening: Flat) -> None:
         """Take from elsewhere what would be computed when it is first asked for."""
@@ -91,8 +93,8 @@ class Surface:
         if self.tidy is not None:
             return self.tidy
         found = cleaned(self.original, largest_part=self.largest_part, fill_holes=self.fill_holes, keys=self.keys)
-        if self.within is None and _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
-            return found.turned()  # a closed surface has an outside by itself
+        if _closed(found.mesh) and np.linalg.det(_tetrahedra(found.mesh)).sum() < 0:
+            found = found.turned()  # a closed surface has an outside by itself
         return found if self.within is None else piece_within(found, self.within)
 
     def piece(self, chosen: Booleans, said: str) -> Surface:
@@ -115,7 +117,7 @@ class Surface:
         if found.rim_lost > LOST:
             raise MeshError(
                 f"'{found.mesh.name}' is too long and narrow to be aligned in a disc, where {found.rim_lost:.0%} of "
-                "its rim would fall together in points: cut it into pieces that are at most ten times as long as wide"
+                "its rim would fall together in points: cut it into pieces that are at most eight times as long as wide"
             )
         tidy = self.cleaned.mesh
         return found if found.mesh is tidy else replace(found, exact=tidy.vertices)
@@ -151,6 +153,12 @@ class Surface:
                 self.mesh, count, nowhere, interior(self.flattening), progress
             )
         return self.points["target"][count]
+
+    def target_radii(self, count: int) -> Floats:
+        """Return the radii of the match discs around the `target_points`, (k,), where none is set."""
+        if count not in self._radii:
+            self._radii[count] = covering_radius(self.flattening.places[self.target_points(count)])
+        return self._radii[count]
 
     def _require_inside(self) -> None:
         """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
@@ -211,7 +219,7 @@ def prepare(
     outer_vertex: int | None = None,
     largest_part: bool = True,
     keys: Floats | None = None,
-    within: Booleans | None = None,
+    within: Piece | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
 ) -> Surface:
     """Compute all that `align` needs of one mesh, whichever it is aligned with, as source or as target.
@@ -228,8 +236,9 @@ def prepare(
         Leave out all parts but the one of largest area.
     keys : (n, d) float64, optional
         Further coordinates of the vertices, as by shape keys; see `surface.cleaned`.
-    within : (n,) bool, optional
-        Vertices among which the piece lies that is to be used, such as those of a head.
+    within : (n,) bool or (k, 2) int, optional
+        Vertices among which the piece lies that is to be used, such as those of a head; or edges along which the mesh
+        is cut open, such as seams, of which what is not the largest piece has no counterpart.
     progress : callable, optional
         As for `align`.
 

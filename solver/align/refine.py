@@ -48,7 +48,6 @@ def refined(
     used = used[:: -(-len(used) // MOST_VERTICES)]
     share = source.mesh.vertex_areas[used] / source.mesh.vertex_areas[used].sum()
     domain = target.domain
-    disc = domain.triangulated(target.places, target.mesh.faces)
     slopes = domain.gradients(target.places, target.mesh.faces, target_descriptors)
     depth = domain.depth(source.places[used])
     stages = _stages(depth, share)
@@ -60,7 +59,7 @@ def refined(
             source_descriptors[chosen],
             share[seen],
             domain,
-            disc,
+            target.triangles,
             target_descriptors,
             slopes,
             scale,
@@ -106,9 +105,9 @@ def _improved(
     """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
     faces = disc.faces
 
-    def agreement(trial: Any) -> tuple[float, Places, Integers, Floats, Floats]:
+    def agreement(trial: Any, near: Integers | None = None) -> tuple[float, Places, Integers, Floats, Floats]:
         place = trial(points)
-        face, barycentric = disc.locate(place)
+        face, barycentric = disc.locate(place, near)
         residual = expected - np.einsum("qk,qkd->qd", barycentric, target_descriptors[faces[face]])
         term = weights * np.exp(-(residual**2).sum(axis=1) / (2 * scale**2))
         return float(term.sum()), place, face, residual, term
@@ -126,7 +125,7 @@ def _improved(
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(force)), force)
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
             trial = domain.near_identity(step) @ mobius
-            found = agreement(trial)
+            found = agreement(trial, face)
             if found[0] > value:
                 break
             damping *= 10

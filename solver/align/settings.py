@@ -37,6 +37,10 @@ class AlignSettings:
         Continue with the best rival in place of the winner, where the winner is the wrong one of an ambiguous pair.
     time_limit : float, optional
         Seconds for each search.
+    thorough : bool
+        Search the orientation that loses, and for a rival, beyond what decides whether they come within
+        `reflect_margin`: then their values are the best there are. Dense refinement, which may go on with one of them,
+        does so whatever this says.
     threads : int, optional
         Of each search, which finds the same with any number; by default one for each processor.
     refine : str
@@ -64,6 +68,7 @@ class AlignSettings:
     reflect_margin: float = 0.06
     take_rival: bool = False
     time_limit: float | None = 60.0
+    thorough: bool = True
     threads: int | None = None
     refine: str = "dense"
     parts: str = "all"

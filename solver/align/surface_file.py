@@ -11,6 +11,7 @@ import numpy as np
 from ..flatten.flatten import Flattening
 from ..flatten.sphere import Flat, SphereFlattening
 from ..surface.mesh import MeshError, TriangleMesh
+from ..surface.tidy import Piece
 from .prepared import Surface
 
 _KIND = "mobius surface 1"
@@ -21,10 +22,10 @@ def save_surface(path: Path | str, surface: Surface) -> None:
     """Write a surface with all that has been computed of it, and its flattening in any case.
 
     Arrays: kind and fingerprint, text; name, text; vertices (n, 3), faces (m, 3) as they came, keys (n, d), within
-    (n,); fill_holes, largest_part, outer_vertex (-1: none); computed (q, 3), the vertices as they are computed with;
-    disc (q,) complex; boundary, holes one after another and hole_sizes; flips_repaired, rim_lost; descriptors (q, d);
-    and source_COUNT and target_COUNT, the points chosen for each count. What is put in order is put in order again when
-    the file is read.
+    (n,) or (k, 2); fill_holes, largest_part, outer_vertex (-1: none); computed (q, 3), the vertices as they are
+    computed with; disc (q,) complex; boundary, holes one after another and hole_sizes; flips_repaired, rim_lost;
+    descriptors (q, d); and source_COUNT and target_COUNT, the points chosen for each count. What is put in order is put
+    in order again when the file is read.
     """
     flat = surface.flattening
     chosen = {f"{role}_{count}": points for role, counts in surface.points.items() for count, points in counts.items()}
@@ -79,8 +80,7 @@ def _checked(stored: dict[str, np.ndarray]) -> Surface:
     _require(original.fingerprint == str(stored["fingerprint"]), "the mesh is not the one that was prepared")
     keys = stored["keys"].astype(np.float64, casting="safe") if "keys" in stored else None
     _require(keys is None or (keys.ndim == 2 and len(keys) == len(original.vertices)), "keys")
-    within = stored["within"].astype(np.bool_, casting="safe") if "within" in stored else None
-    _require(within is None or within.shape == (len(original.vertices),), "within")
+    within = _piece(stored["within"], len(original.vertices)) if "within" in stored else None
     outer = int(stored["outer_vertex"])
     surface = Surface(
         original,
@@ -133,6 +133,15 @@ def _filled(surface: Surface, flat: Flat, stored: dict[str, np.ndarray]) -> Surf
             if name.startswith(f"{role}_") and name.removeprefix(f"{role}_").isdecimal():
                 counts[int(name.removeprefix(f"{role}_"))] = _indices(stored[name], size)
     return surface
+
+
+def _piece(within: np.ndarray, size: int) -> Piece:
+    """Return what is used of a mesh of so many vertices, after a look at it."""
+    if within.dtype == np.bool_:
+        _require(within.shape == (size,), "within")
+        return within
+    _require(within.ndim == 2 and within.shape[1] == 2, "within")
+    return _indices(within.ravel(), size).reshape(-1, 2)
 
 
 def _indices(values: np.ndarray, size: int) -> np.ndarray:

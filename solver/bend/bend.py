@@ -290,7 +290,7 @@ def _lengths(stiffest: float, softest: float, rounds: int) -> Floats:
 
 def _positions(places: Places, source: Flat, onto: SurfacePoints) -> Floats:
     """Return where points of the source's domain lie on the scaled source, (q, 3)."""
-    face, barycentric = source.domain.triangulated(source.places, source.mesh.faces).locate(places)
+    face, barycentric = source.triangles.locate(places)
     return np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
 
 

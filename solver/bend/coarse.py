@@ -104,7 +104,7 @@ def _regions(mesh: TriangleMesh, nodes: Integers) -> Integers:
     _, _, nearest = dijkstra(edge_graph(mesh), indices=nodes, min_only=True, return_predecessors=True)
     place = np.full(len(mesh.vertices), -1)
     place[nodes] = np.arange(len(nodes))
-    return np.where(nearest >= 0, place[nearest], -1)
+    return np.where(nearest >= 0, place[np.maximum(nearest, 0)], -1)  # -9999 where no node leads
 
 
 def _dual(regions: Integers) -> Integers:

@@ -39,21 +39,38 @@ def local_similarities(
     there_square, here_square, products = sums[:, 0], sums[:, 1], sums[:, 2:].reshape(-1, 3, 3)
     there_normal = interpolate(correspondence, source.vertex_normals())
     there_normal /= np.maximum(np.linalg.norm(there_normal, axis=1, keepdims=True), 1e-300)
-    here_normal = target.vertex_normals()
+    here_normal = target.vertex_normals() * _agreeing(correspondence, place, there_normal, triangles)[:, None]
     known = (there_square > 0) & (here_square > 0)
     weight = np.sqrt(there_square * here_square)[known, None, None]
     normals = here_normal[known, :, None] * there_normal[known, None]
     wanted = products[known] / weight + normals
     if reach > 0 and known.any():
-        return _diffused(target, reach, known, wanted, there_square, here_square)
-    rotation = np.broadcast_to(np.eye(3), (size, 3, 3)).copy()
-    rotation[known] = nearest_orthogonal(wanted)
-    scale = np.ones(size)
-    scale[known] = np.sqrt(here_square[known] / there_square[known])
+        rotation, scale = _diffused(target, reach, known, wanted, there_square, here_square)
+    else:
+        rotation = np.broadcast_to(np.eye(3), (size, 3, 3)).copy()
+        rotation[known] = nearest_orthogonal(wanted)
+        scale = np.ones(size)
+        scale[known] = np.sqrt(here_square[known] / there_square[known])
     if (leader := correspondence.leader) is not None:
         riders = np.flatnonzero(leader >= 0)
         rotation[riders], scale[riders] = rotation[leader[riders]], scale[leader[riders]]
     return rotation, scale
+
+
+def _agreeing(correspondence: Correspondence, place: Floats, there_normal: Floats, triangles: Integers) -> Floats:
+    """Return 1 or -1 at each target vertex, (n,): -1 in parts that are inside out beside their counterparts.
+
+    As two artists' lashes may be, which have no inside. The main part's map, which may mirror, says what is not.
+    """
+    part = correspondence.part
+    if part is None:
+        return np.ones(len(place))
+    corner = place[triangles]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    along = np.einsum("md,md->m", across, there_normal[triangles].sum(axis=1))
+    sums = np.bincount(np.maximum(part[triangles[:, 0]], 0), along, minlength=int(part.max(initial=0)) + 1)
+    sign = np.where(sums * sums[0] < 0, -1.0, 1.0)
+    return sign[np.maximum(part, 0)]
 
 
 def _diffused(

@@ -14,6 +14,7 @@ from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh, directed_ed
 from .correspond import Correspondence
 from .frames import local_similarities, nearest_orthogonal
 from .parts import pieces
+from .riders import Riders
 
 REACH = 0.02
 """Length up to which gradients count more than the displacement itself, in square roots of the target's area.
@@ -52,6 +53,8 @@ class GradientTransfer:
     target : TriangleMesh
     known : (n,) bool
         Target vertices that have a counterpart.
+    riders : Riders or None
+        What moves as one piece with what lies beside it.
     """
 
     rotation: Floats
@@ -59,6 +62,7 @@ class GradientTransfer:
     places: Floats
     target: TriangleMesh
     known: Booleans
+    riders: Riders | None
     _turn: Floats
     _matrix: csr_array
     _coordinates: Floats
@@ -101,6 +105,7 @@ class GradientTransfer:
             places=places,
             target=target,
             known=known,
+            riders=Riders.of(correspondence, source, target, rotation, scale),
             _turn=turn,
             _matrix=matrix,
             _coordinates=coordinates,
@@ -127,6 +132,8 @@ class GradientTransfer:
         start, stop = directed_edges(faces).T
         result += self._solve(self._divergence(wanted - (result[stop] - result[start]).reshape(wanted.shape)))
         result[~self.known] = 0
+        if self.riders is not None:
+            result[self.riders.vertices] = self.riders(displacements)
         return result
 
     def moved_places(self, displacements: Floats) -> Floats:

@@ -58,7 +58,11 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         **(
             {
                 "proved": found.proved,
-                "rotation": {"value": found.rotation_value, "upper_bound": found.rotation_bound},
+                "rotation": {
+                    "value": found.rotation_value,
+                    "upper_bound": found.rotation_bound,
+                    "certified": found.rotations_certified,
+                },
             }
             if isinstance(found, SphereSearchResult)
             else {}

@@ -4,7 +4,8 @@ Work is done in tasks, by any executor of `concurrent.futures`, and kept in a fo
 show which are wrong, without any ground truth; points are carried along paths of those that are not.
 """
 
-from .collect import Collection, Plan, Specimen, Told, collect
+from .collect import Collection, collect
 from .engine import processes
+from .plan import Plan, Specimen, Told
 
 __all__ = ["Collection", "Plan", "Specimen", "Told", "collect", "processes"]

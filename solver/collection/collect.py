@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -12,89 +12,15 @@ from typing import Any
 import numpy as np
 
 from ..align.settings import AlignSettings
-from ..surface.mesh import Booleans, Floats, MeshError, TriangleMesh
+from ..surface.mesh import Booleans, Floats
 from .atlas import Atlas
 from .cycles import Edge, closing_error, edge_errors, specimen_errors, suspect, triangles
-from .engine import Open, completed
-from .folder import Folder, digest, figures_of
+from .engine import Open
+from .folder import Folder
 from .pair import Figures
+from .plan import Plan, Specimen, Told
 from .routes import medoid, star_routes, tree_routes
-from .tasks import Compare, Prepare, Result, Task
-
-
-@dataclass(frozen=True)
-class Specimen:
-    """A surface of a collection.
-
-    Attributes
-    ----------
-    name : str
-        A file may have it.
-    stamp : str
-        Changes with the file or array that it is read from.
-    read : callable
-        Returns the mesh, and further coordinates of its vertices, (n, d), or None; see `surface.cleaned`. May raise
-        `MeshError` or OSError.
-    """
-
-    name: str
-    stamp: str
-    read: Callable[[], tuple[TriangleMesh, Floats | None]]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which pairs are aligned, and how.
-
-    Attributes
-    ----------
-    pairs : str
-        "all": each with each, by `settings.refine`. "star": one with each of the others. "tree": all pairs by Möbius
-        maps, then those of their minimum spanning tree by `settings.refine`.
-    template : str or None
-        The one of a star, and where the tree's paths begin; None: the medoid, for which all pairs are aligned by
-        Möbius maps.
-    check : bool
-        Of a star with a named template: also align each with the next by Möbius maps, so that there are three-cycles.
-    largest_part : bool
-        Leave out all parts of a specimen but the one of largest area.
-    """
-
-    pairs: str = "all"
-    template: str | None = None
-    check: bool = True
-    largest_part: bool = True
-
-    def __post_init__(self) -> None:
-        if self.pairs not in ("all", "star", "tree"):
-            raise ValueError(f"pairs must be all, star or tree, not '{self.pairs}'")
-
-
-@dataclass(frozen=True)
-class Told:
-    """How far a collection is.
-
-    Attributes
-    ----------
-    stage : str
-    done, total : int
-        Of the stage's tasks, those done before included.
-    fresh : int
-        Of them, those that this run has done.
-    failed : int
-    name : str
-        What was done last.
-    error : str or None
-        Why it could not be done.
-    """
-
-    stage: str
-    done: int
-    total: int
-    fresh: int
-    failed: int
-    name: str = ""
-    error: str | None = None
+from .work import Work
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +106,7 @@ def collect(
         Begins a `concurrent.futures.Executor`; see `engine.processes`.
     plan : Plan, optional
     settings : AlignSettings, optional
-        Threads are one for each task, whatever it says.
+        Threads are one for each task, and no more is searched than what decides (`thorough`), whatever it says.
     at_a_time : int
         How many tasks the executor works on at a time.
     tell : callable, optional
@@ -191,7 +117,7 @@ def collect(
     ValueError
         Fewer than two specimens could be prepared; two have one name; the template is none of them.
     """
-    plan, settings = plan or Plan(), replace(settings or AlignSettings(), threads=1)
+    plan, settings = plan or Plan(), replace(settings or AlignSettings(), threads=1, thorough=False)
     # a pair's direction is the same whatever is added later
     specimens = sorted(specimens, key=lambda specimen: specimen.name)
     names = [specimen.name for specimen in specimens]
@@ -207,7 +133,7 @@ def collect(
             "specimens": [{"name": specimen.name, "stamp": specimen.stamp} for specimen in specimens],
         }
     )
-    work = _Work(folder, opened, at_a_time, tell or (lambda told: None), {})
+    work = Work(folder, opened, at_a_time, tell or (lambda told: None), {})
     try:
         names = work.prepared(specimens, settings, plan)
         if len(names) < 2:
@@ -218,7 +144,7 @@ def collect(
         folder.close()
 
 
-def _collected(work: _Work, names: list[str], plan: Plan, settings: AlignSettings) -> Collection:
+def _collected(work: Work, names: list[str], plan: Plan, settings: AlignSettings) -> Collection:
     count = len(names)
     rough = replace(settings, refine="mobius" if settings.refine == "dense" else settings.refine)
     root = None
@@ -280,113 +206,3 @@ def _checked(
     cycles = triangles(edges)
     open_by = np.array([closing_error(atlas, cycle) for cycle in cycles.tolist()], np.float64)
     return edge_errors(edges, cycles, open_by), (cycles, open_by)
-
-
-@dataclass(frozen=True, eq=False)
-class _Work:
-    """What is done by tasks."""
-
-    folder: Folder
-    opened: Open
-    at_a_time: int
-    tell: Callable[[Told], None]
-    failures: dict[str, str]
-
-    def prepared(self, specimens: Sequence[Specimen], settings: AlignSettings, plan: Plan) -> list[str]:
-        """Prepare what is not, and return the names of all that are."""
-        asked = digest(settings, prepare_only=True, largest_part=plan.largest_part)
-        new = [x for x in specimens if not self.folder.prepared(x.name, x.stamp, asked)]
-        stamps = {specimen.name: specimen.stamp for specimen in specimens}
-        given = {
-            name: value for name, value in asdict(settings).items() if name in ("samples", "targets", "fill_holes")
-        }
-        count = _Count("preparing", len(specimens), len(specimens) - len(new), self.tell)
-
-        def tasks() -> Iterator[tuple[str, Task]]:
-            for specimen in new:
-                try:
-                    mesh, keys = specimen.read()
-                except (MeshError, OSError) as error:
-                    self.failures[specimen.name] = str(error)
-                    count.one(specimen.name, str(error))
-                    continue
-                path = str(self.folder.surface(specimen.name).resolve())
-                yield (
-                    specimen.name,
-                    Prepare(specimen.name, mesh.vertices, mesh.faces, keys, given, plan.largest_part, path),
-                )
-
-        for name, result in completed(tasks(), self.opened, self.at_a_time):
-            if (error := result.get("error")) is not None:
-                self.failures[name] = error
-            else:
-                self.folder.add_specimen(name, stamps[name], asked, result)
-            count.one(name, error)
-        return [specimen.name for specimen in specimens if specimen.name not in self.failures]
-
-    def aligned(self, stage: str, names: list[str], edges: list[Edge], settings: AlignSettings) -> dict[Edge, Figures]:
-        """Align the pairs that are not, and return what is known of those that could be."""
-        asked = digest(settings)
-        known = self.folder.pairs()
-        found: dict[Edge, Figures] = {}
-        new: list[Edge] = []
-        for edge in edges:
-            line = known.get((names[edge[0]], names[edge[1]], asked))
-            if line is None or self._map_is_missing(line):
-                new.append(edge)
-            else:
-                self._take(edge, line, found)
-        del known
-        count = _Count(stage, len(edges), len(edges) - len(new), self.tell)
-        given = asdict(settings)
-
-        def tasks() -> Iterator[tuple[Edge, Task]]:
-            for edge in _in_blocks(new):
-                source, target = (names[k] for k in edge)
-                here, there = (str(self.folder.surface(name).resolve()) for name in (source, target))
-                dense = str(self.folder.dense_map(source, target).resolve()) if settings.refine == "dense" else None
-                yield edge, Compare(here, there, given, dense)
-
-        for edge, result in completed(tasks(), self.opened, self.at_a_time):
-            line = self.folder.add_pair(names[edge[0]], names[edge[1]], asked, result)
-            self._take(edge, line, found)
-            count.one(_pair_name(line), line.get("error"))
-        return found
-
-    def _map_is_missing(self, line: Result) -> bool:
-        return bool(line.get("dense")) and not self.folder.dense_map(line["source"], line["target"]).is_file()
-
-    def _take(self, edge: Edge, line: dict[str, Any], found: dict[Edge, Figures]) -> None:
-        known = figures_of(line)
-        if known is None:
-            self.failures[_pair_name(line)] = line["error"]
-        else:
-            found[edge] = known
-
-
-class _Count:
-    """Counts the tasks of a stage and tells of each."""
-
-    def __init__(self, stage: str, total: int, before: int, tell: Callable[[Told], None]) -> None:
-        self.now = Told(stage, before, total, 0, 0)
-        self.tell = tell
-        tell(self.now)
-
-    def one(self, name: str, error: str | None) -> None:
-        now = self.now
-        failed = now.failed + (error is not None)
-        self.now = replace(now, done=now.done + 1, fresh=now.fresh + 1, failed=failed, name=name, error=error)
-        self.tell(self.now)
-
-
-BLOCK = 12
-"""Specimens of a block of pairs: those of two blocks fit among the surfaces that a process keeps in memory."""
-
-
-def _in_blocks(edges: list[Edge]) -> list[Edge]:
-    """Return pairs in an order in which the same specimens come soon again."""
-    return sorted(edges, key=lambda edge: (edge[0] // BLOCK, edge[1] // BLOCK, edge))
-
-
-def _pair_name(line: dict[str, Any]) -> str:
-    return f"{line['source']} to {line['target']}"

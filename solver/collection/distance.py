@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 
 from ..flatten.distortion import signed_areas
 from ..flatten.flatten import Flattening
-from ..flatten.locate import TriangulatedDisc, plane
+from ..flatten.locate import plane
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
 from ..surface.mesh import Complexes, Floats, Integers
@@ -58,11 +58,6 @@ class EvenFlow:
         self.vertices = surface.mesh.vertices if surface.exact is None else surface.exact
 
     @cached_property
-    def disc(self) -> TriangulatedDisc:
-        """The surface's disc, prepared for point location."""
-        return TriangulatedDisc.of(self.surface.disc, self.surface.mesh.faces)
-
-    @cached_property
     def _solvers(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
         """What spreads carried areas, and what finds the potential."""
         size = len(self.areas)
@@ -98,7 +93,7 @@ class EvenFlow:
         return places
 
     def _velocity(self, drift: Complexes, density: Floats, places: Complexes, time: float) -> Complexes:
-        face, weights = self.disc.locate(places)
+        face, weights = self.surface.triangles.locate(places)
         corners = self.surface.mesh.faces[face]
         flow = (weights * drift[corners]).sum(axis=1)
         return flow / ((1 - time) * (weights * density[corners]).sum(axis=1) + time)
@@ -149,7 +144,7 @@ def continuous_procrustes(
     areas = areas / areas.sum()
     corners = source.surface.mesh.faces
     start = (barycentric[points] * source.surface.disc[corners[face[points]]]).sum(axis=1)
-    ends, weights = source.disc.locate(source.evened(start, face[known], barycentric[known], areas))
+    ends, weights = source.surface.triangles.locate(source.evened(start, face[known], barycentric[known], areas))
     onto = np.einsum("qk,qkd->qd", weights, source.vertices[corners[ends]]) / np.sqrt(source.surface.mesh.area)
     exact = target.mesh.vertices if target.exact is None else target.exact
     here = exact[points] / np.sqrt(target.mesh.area)

@@ -81,11 +81,12 @@ def completed(tasks: Iterator[tuple[Named, Task]], opened: Open, at_a_time: int)
                 if isinstance(error, BrokenExecutor):
                     broken = True
                     if alone and len(done) == 1 and not running:
-                        yield name, {"error": "the process that worked on it ended: is there enough memory?"}
+                        ended = "the process that worked on it ended: is there enough memory?"
+                        yield name, {"error": ended, "again": True}
                     else:
                         again.append((name, task))
                 elif error is not None:
-                    yield name, {"error": f"{type(error).__name__}: {error}"}
+                    yield name, {"error": f"{type(error).__name__}: {error}", "again": True}
                 else:
                     yield name, future.result()
             if broken:

@@ -5,6 +5,7 @@
     specimens.jsonl      a line per specimen, written when it is prepared: its fingerprints, and what was done to it
     pairs.jsonl          a line per pair, written when it is done: of several about one the last counts
     maps/A to B.npz      dense maps, as `carry.map_file` writes them, and `transfer --use-map` reads them
+    lock                 who works here has it
 
 Every line and file is whole or not there. A run that is stopped in whatever way goes on from what is there.
 """
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..align.settings import AlignSettings
+from .lock import locked
 from .pair import Figures
 from .tasks import Result, whole_file
 
@@ -27,6 +29,10 @@ PREPARING = ("samples", "targets", "fill_holes")
 
 VERSION = 3
 """Of the lines and of what is computed for them: those of another version are done anew."""
+
+
+LONGEST = 100
+"""Bytes of a specimen's name: two of them, and what is added, are within the 255 that a file's name may have."""
 
 
 def digest(settings: AlignSettings, *, prepare_only: bool = False, **more: Any) -> str:
@@ -56,6 +62,7 @@ class Folder:
         self.root = root
         for folder in (root, root / "surfaces", root / "maps"):
             folder.mkdir(parents=True, exist_ok=True)
+        self._lock = locked(root / "lock")
         for left in (*root.glob(".*.unfinished"), *root.glob("*/.*.unfinished")):
             left.unlink(missing_ok=True)
         self._open: dict[str, TextIO] = {}
@@ -64,6 +71,10 @@ class Folder:
     def surface(self, name: str) -> Path:
         """Return where a prepared specimen is."""
         return self.root / "surfaces" / f"{name}.npz"
+
+    def handed(self, name: str) -> Path:
+        """Return where a specimen's mesh is, as it was read, until it is prepared."""
+        return self.root / "surfaces" / f".{name}.mesh.unfinished"
 
     def dense_map(self, source: str, target: str) -> Path:
         """Return where the dense map of a pair is."""
@@ -115,6 +126,7 @@ class Folder:
         for file in self._open.values():
             file.close()
         self._open.clear()
+        self._lock.close()
 
     def _add(self, name: str, line: dict[str, Any]) -> None:
         if name not in self._open:
@@ -130,7 +142,10 @@ class Folder:
             for raw in lines:
                 # a line that was being written when the program ended has no end
                 if raw.endswith(b"\n"):
-                    yield json.loads(raw)
+                    try:
+                        yield json.loads(raw)
+                    except ValueError:  # as where the machine lost its power: it is done again
+                        continue
 
 
 def figures_of(line: dict[str, Any]) -> Figures | None:
@@ -152,4 +167,7 @@ def _appending(path: Path) -> TextIO:
 def free_name(name: str) -> str:
     """Return a specimen's name as a file may have it on every system."""
     kept = "".join("_" if sign in '<>:"/\\|?*' or ord(sign) < 32 else sign for sign in name).strip(" .")
+    if len(kept.encode()) > LONGEST:
+        told_apart = hashlib.sha256(kept.encode()).hexdigest()[:8]
+        kept = kept.encode()[: LONGEST - 9].decode(errors="ignore").strip(" .") + "-" + told_apart
     return kept or "specimen"

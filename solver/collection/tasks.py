@@ -14,6 +14,8 @@ from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..align.pipeline import align
 from ..align.prepared import Surface, prepare
 from ..align.settings import AlignSettings
@@ -21,25 +23,23 @@ from ..align.surface_file import load_surface, save_surface
 from ..carry.correspond import correspond
 from ..carry.map_file import save_map
 from ..flatten.sphere import require_open
-from ..surface.mesh import Floats, Integers, MeshError, TriangleMesh
+from ..surface.mesh import Floats, MeshError, TriangleMesh
 from .distance import EvenFlow
 from .pair import figures
 
 KEPT = 24
-"""Prepared surfaces that a process keeps in memory: some 3 MB each, of 10,000 triangles."""
+"""Prepared surfaces that a process keeps in memory: 13 MB each, of 10,000 triangles (`tests/bench/growth.py`)."""
 
 Result = dict[str, Any]
-"""Plain data: what a task found, or "error", why it found nothing."""
+"""Plain data: what a task found, or "error", why it found nothing, and "again", if that is no fault of the surfaces."""
 
 
 @dataclass(frozen=True)
 class Prepare:
-    """Put a mesh in order, flatten it, measure its curvature and choose its points; write that to `path`."""
+    """Put the mesh in a file in order, flatten it, measure curvature and choose points; write that to `path`."""
 
     name: str
-    vertices: Floats
-    faces: Integers
-    keys: Floats | None
+    mesh: str
     settings: dict[str, Any]
     largest_part: bool
     path: str
@@ -69,10 +69,12 @@ def run(task: dict[str, Any]) -> Result:
     }
     try:
         return work[task["kind"]](**task["given"])
-    except (MeshError, OSError, ValueError) as error:
+    except (MeshError, ValueError) as error:
         return {"error": str(error) or type(error).__name__}
+    except OSError as error:
+        return {"error": str(error) or type(error).__name__, "again": True}
     except MemoryError:
-        return {"error": "there is not enough memory for it"}
+        return {"error": "there is not enough memory for it", "again": True}
     except Exception as error:  # a fault of the program: named, and the others go on
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{type(error).__name__} in {Path(where.filename).name}, line {where.lineno}: {error}"}
@@ -95,10 +97,22 @@ def _end_with(ended: Callable[[], object]) -> None:
     os._exit(1)
 
 
+def write_mesh(path: Path, mesh: TriangleMesh, keys: Floats | None) -> None:
+    """Write a mesh for `Prepare`, and the further coordinates of its vertices."""
+    held = {} if keys is None else {"keys": keys}
+    with path.open("wb") as file:
+        np.savez(file, vertices=mesh.vertices, faces=mesh.faces, **held)
+
+
+def _read_mesh(path: Path, name: str) -> tuple[TriangleMesh, Floats | None]:
+    with np.load(path, allow_pickle=False) as held:
+        return TriangleMesh(held["vertices"], held["faces"], name), held.get("keys")
+
+
 def _prepare(task: Prepare) -> Result:
     begun = time.process_time()
-    mesh = TriangleMesh(task.vertices, task.faces, task.name)
-    surface = prepare(mesh, AlignSettings(**task.settings), largest_part=task.largest_part, keys=task.keys)
+    mesh, keys = _read_mesh(Path(task.mesh), task.name)
+    surface = prepare(mesh, AlignSettings(**task.settings), largest_part=task.largest_part, keys=keys)
     require_open(surface.flattening)
     with whole_file(Path(task.path)) as path:
         save_surface(path, surface)

@@ -20,6 +20,7 @@ from .distortion import Distortion, distortion, signed_areas
 from .domain import DISC, Domain
 from .harmonic import riemann_map
 from .injective import require_injective, untangled
+from .locate import TriangulatedDisc
 from .mid_edge import mid_edge_map
 
 METHODS = {"harmonic": riemann_map, "mid-edge": mid_edge_map, "circle-packing": packed}
@@ -70,6 +71,11 @@ class Flattening:
     def loops(self) -> tuple[Integers, ...]:
         """All boundary loops, the outer one first."""
         return (self.boundary, *self.holes)
+
+    @cached_property
+    def triangles(self) -> TriangulatedDisc:
+        """The triangles in the disc, prepared for point location."""
+        return self.domain.triangulated(self.places, self.mesh.faces)
 
     @cached_property
     def distortion(self) -> Distortion:

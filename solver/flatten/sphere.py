@@ -28,7 +28,8 @@ from .domain import SPHERE, Domain
 from .flatten import Flattening
 from .harmonic import riemann_map
 from .injective import untangled
-from .sphere_injective import require_injective, untangled_sphere
+from .locate import TriangulatedDisc
+from .sphere_injective import require_injective, require_room, untangled_sphere
 
 FAR_POINTS = 6
 """Points far from each other, from which on the whole the fattest place is least far: the ends of what juts out."""
@@ -63,6 +64,11 @@ class SphereFlattening:
     def domain(self) -> Domain:
         """Where the places are."""
         return SPHERE
+
+    @cached_property
+    def triangles(self) -> TriangulatedDisc:
+        """The triangles in the sphere, prepared for point location."""
+        return self.domain.triangulated(self.places, self.mesh.faces)
 
     @property
     def boundary(self) -> Integers:
@@ -117,7 +123,8 @@ def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
     Raises
     ------
     MeshError
-        The mesh is no sphere, or has parts that shrink so much on it that numbers cannot tell their triangles apart.
+        The mesh is no sphere, or has parts that shrink so much on it that numbers cannot tell their triangles apart,
+        or that nothing can be matched there.
 
     Examples
     --------
@@ -139,6 +146,7 @@ def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
         if not spherical_distortion(mesh, sphere).flips:
             break
     require_injective(mesh, sphere)
+    require_room(mesh, sphere)
     sphere[~mesh.used] = np.nan
     return SphereFlattening(mesh, sphere, before)
 

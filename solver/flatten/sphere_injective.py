@@ -20,6 +20,14 @@ COARSE = 6
 """Powers of 10 that areas shrink by up to which it is not numbers that fail: geodesics between few vertices, some of
 them far apart, cross where the straight lines of the plane do not."""
 
+LITTLE, CROWDED = 1e-6, 0.1
+"""A surface has no room on a sphere where more than this share of its area shrinks there to less than that of what it
+would have evenly: of two whole bodies 0.23 and 0.25 does, of hands up to 0.05, of heads, feet and cortices none."""
+
+DIGITS, LOST = 16, 0.01
+"""And where this share shrinks by more than a double has digits: the bodies' legs and arms, by 10^17 and more. A thigh
+bone, of which 0.63 shrinks by a million and nothing by more than 10^13, still goes, if doubtfully."""
+
 MOST_CHARTS = 100
 """Repairs of places where triangles are turned over; more are no map to be repaired."""
 
@@ -46,6 +54,18 @@ def require_injective(mesh: TriangleMesh, sphere: Floats) -> None:
         f"'{mesh.name}' juts out too far for a sphere: {what}, as parts shrink to 1/10^{power} of their area there: "
         "cut off what juts out, as arms and legs"
     )
+
+
+def require_room(mesh: TriangleMesh, sphere: Floats) -> None:
+    """Raise `MeshError` if a map to the sphere, (n, 3), leaves much of the surface hardly any room, and some none."""
+    covered = np.abs(solid_angles(sphere, mesh.faces)) / (4 * np.pi)
+    areas = mesh.face_areas / mesh.area
+    crowded, lost = (float(areas[covered < areas * least].sum()) for least in (LITTLE, 10.0**-DIGITS))
+    if crowded > CROWDED and lost > LOST:
+        raise MeshError(
+            f"'{mesh.name}' juts out too far for a sphere: {crowded:.0%} of it would shrink there by more than a "
+            f"million, parts to 1/10^{shrinkage(mesh, covered)} of their area: cut off what juts out, as arms and legs"
+        )
 
 
 def solid_angles(sphere: Floats, faces: Integers) -> Floats:

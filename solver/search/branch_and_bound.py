@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from fractions import Fraction
@@ -21,11 +21,11 @@ import numpy.typing as npt
 
 from ..mobius import Mobius
 from ..stages import SearchProgress
-from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.mesh import Booleans, Complexes, Floats, Integers
 from .kernels import kernels_for
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, whole_disc
 from .matching import matching
-from .outcome import SearchResult
+from .outcome import TRACED, SearchResult
 from .watch import look, watched
 
 CELLS_AT_ONCE = 64
@@ -162,6 +162,9 @@ class Search:
     """The state of one search: the best transformation so far, and the cells that may hold a better one."""
 
     identity: Any = Mobius()
+    bound_at, half_at = BOUND, HALF
+    """Columns of a cell's bound and half side."""
+    at_once = CELLS_AT_ONCE
 
     def __init__(self, z_max: float, limit: float, until: Callable[[float, float, int], bool]) -> None:
         self.z_max, self.until = z_max, until
@@ -172,11 +175,13 @@ class Search:
         self.best: Any = self.identity
         self.best_side = 0
         self.value = 0.0
+        self.floor = -np.inf  # what is worth no more is not looked for
         self.matches: Integers = np.zeros((0, 2), np.intp)
         self.unlooked = limit  # what is not known to be impossible before there is a frontier
         self.finished_bound = -np.inf  # of cells too small to split
         self.nodes = 0
         self.proved = 0.0, limit, 0
+        self.started, self.trace = time.perf_counter(), list[SearchProgress]()
         self.slow = False
         self.ended = self.out_of_time = False
 
@@ -185,10 +190,15 @@ class Search:
         look(self.halt)
 
     @property
+    def least(self) -> float:
+        """What a transformation has to exceed."""
+        return max(self.value, self.floor)
+
+    @property
     def upper_bound(self) -> float:
         """What no transformation exceeds."""
-        tops = [open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier]
-        return float(max(self.value, self.unlooked, self.finished_bound, *tops))
+        tops = [open_[:, self.bound_at].max(initial=-np.inf) for open_ in self.frontier]
+        return float(max(self.least, self.unlooked, self.finished_bound, *tops))
 
     def progress(self, seconds: float) -> SearchProgress:
         """Return what was proved when the last round ended."""
@@ -208,6 +218,7 @@ class Search:
             cancelled=cancelled,
             out_of_time=self.out_of_time or not (self.ended or cancelled),
             kernels=self.kernels[0].name if self.kernels else "",
+            trace=(*self.trace, SearchProgress(self.value, upper, self.nodes, seconds)),
             counted=(self.sides[self.best_side], self._plain(best)) if self.sides else None,
         )
 
@@ -228,6 +239,11 @@ class Search:
 
     def run(self, deadline: float, threads: int) -> None:
         """Split cells, best bound first, until none can hold a better transformation, it is enough, or time is up."""
+        for _ in self.rounds(deadline, threads):
+            pass
+
+    def rounds(self, deadline: float, threads: int) -> Iterator[None]:
+        """Do the same, and yield after every round."""
         rounds = 0
         # bounds per open cell and round: few at first, as the best bounds lead to a good value; more later, so that a
         # long search does not spend its time here
@@ -236,6 +252,7 @@ class Search:
             # cells that ended undecided may turn out worthless: another may yet reach their bound
             while any(map(len, self.frontier)):
                 self.proved = self.value, self.upper_bound, self.nodes
+                self._traced()
                 if self.until(*self.proved):
                     break
                 if time.perf_counter() > deadline:
@@ -244,15 +261,23 @@ class Search:
                 self.check()
                 self._round(min(8 << rounds // 32, most), pool)
                 rounds += 1
+                yield
         self.ended = True
+
+    def _traced(self) -> None:
+        """Note what is proved, unless it is hardly more than what was noted last."""
+        value, bound, nodes = self.proved
+        last = self.trace[-1] if self.trace else None
+        if last is None or value > last.value or bound - value < (last.upper_bound - last.value) * (1 - TRACED):
+            self.trace.append(SearchProgress(value, bound, nodes, time.perf_counter() - self.started))
 
     def _round(self, budget: int, pool: ThreadPoolExecutor | None) -> None:
         """Take the best open cells off the frontier, search in each for a while, and put back what is left of them."""
-        bounds = np.concatenate([open_[:, BOUND] for open_ in self.frontier])
+        bounds = np.concatenate([open_[:, self.bound_at] for open_ in self.frontier])
         full = len(bounds) > FRONTIER
-        rank = np.concatenate([open_[:, HALF] for open_ in self.frontier]) if full else -bounds
+        rank = np.concatenate([open_[:, self.half_at] for open_ in self.frontier]) if full else -bounds
         taken = np.zeros(len(bounds), bool)
-        count = min(CELLS_AT_ONCE, len(bounds))
+        count = min(self.at_once, len(bounds))
         taken[np.argpartition(rank, count - 1)[:count]] = True
         first = 0
         for side, open_ in enumerate(self.frontier):
@@ -261,26 +286,39 @@ class Search:
             cells = open_[chosen]
             if len(cells) == 0:
                 continue
-            left = self._expanded(side, cells[np.argsort(-cells[:, BOUND], kind="stable")], budget, pool)
+            cells = cells[np.argsort(-cells[:, self.bound_at], kind="stable")]
+            left = self._expanded(side, cells, budget, pool)
             self.frontier[side] = np.concatenate([open_[~chosen], left])
             self._improve(side, left)
+        self.close()
+
+    def close(self) -> None:
+        """Take off the frontier what cannot hold a better transformation, or is too small to be split."""
         for side, open_ in enumerate(self.frontier):
-            alive = open_[open_[:, BOUND] > self.value]
-            ended = alive[:, HALF] <= SMALLEST_CELL
-            self.finished_bound = max(self.finished_bound, alive[ended, BOUND].max(initial=-np.inf))
+            alive = open_[open_[:, self.bound_at] > self.least]
+            ended = self._settled(alive)
+            self.finished_bound = max(self.finished_bound, alive[ended, self.bound_at].max(initial=-np.inf))
             self.frontier[side] = alive[~ended]
+
+    def _settled(self, cells: Floats) -> Booleans:
+        """Return which cells are not split further: what their bounds leave open is reported as a gap."""
+        return cells[:, self.half_at] <= SMALLEST_CELL
 
     def _expanded(self, side: int, cells: Floats, budget: int, pool: ThreadPoolExecutor | None) -> Floats:
         """Return what is left of cells after splitting each for a while; the threads share the work."""
-        kernels, value = self.kernels[side], self.value
+        kernels, limits = self.kernels[side], self._limits()
         shares = [cells[k::SHARES] for k in range(min(SHARES, len(cells)))]
         begun = time.perf_counter()
         run = pool.map if pool and self.slow else map
-        parts = list(run(lambda share: kernels.expand(share, value, budget), shares))
+        parts = list(run(lambda share: kernels.expand(share, *limits, budget), shares))
         # what is done sooner than it is handed over is not handed over
         self.slow = time.perf_counter() - begun > HANDED_OVER
         self.nodes += sum(spent for _, spent in parts)
         return np.concatenate([left for left, _ in parts])
+
+    def _limits(self) -> tuple[float, ...]:
+        """Return what bounds are held against."""
+        return (self.least,)
 
     def _improve(self, side: int, left: Floats) -> None:
         """Look for a better transformation at the centres of the most promising cells, then around the best of them."""
@@ -291,9 +329,9 @@ class Search:
         if len(z) == 0:
             return
         # at the centre of a cell the window's angles are the rotations themselves
-        values, rotations = kernels.rotations(z, self.value, inside[:, [FROM, WIDTH]])
+        values, rotations = kernels.rotations(z, self.least, inside[:, [FROM, WIDTH]])
         k = int(np.argmax(values))
-        if values[k] <= self.value:
+        if values[k] <= self.least:
             return
         z, value, theta = complex(z[k]), float(values[k]), float(rotations[k])
         # a pattern search: the value is a step function, so there is no slope to follow

@@ -104,7 +104,7 @@ class Matching:
     @cached_property
     def target(self) -> Integers:
         """Target point of each pair, (P,)."""
-        return self._targets(0, len(self.source))
+        return self.targets_of(0, len(self.source))
 
     @cached_property
     def centre(self) -> Complexes:
@@ -121,7 +121,7 @@ class Matching:
         """Weight of each pair, (P,), in (0, 1]: multiples of `unit`."""
         return self.weights_of(np.arange(self.count))
 
-    def _targets(self, first: int, last: int) -> Integers:
+    def targets_of(self, first: int, last: int) -> Integers:
         """Return the target points of the pairs of source points first to last - 1."""
         if self.rows is None:
             return np.tile(np.arange(len(self.centres)), last - first)
@@ -197,7 +197,7 @@ class Matching:
             point, target = np.nonzero(table <= farthest)
             return (point + first) * len(self.centres) + target, point + first, target, table[point, target]
         point = np.repeat(np.arange(first, last), np.diff(self.starts[first : last + 1]))
-        target = self._targets(first, last)
+        target = self.targets_of(first, last)
         distance = self._sizes(image[point] - self.centres[target])
         pair = np.flatnonzero(distance <= farthest[target])
         return pair + self.starts[first], point[pair], target[pair], distance[pair]

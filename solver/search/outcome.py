@@ -9,8 +9,12 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ..mobius import Mobius
+from ..stages import SearchProgress
 from ..surface.mesh import Integers
 from .matching import Matching
+
+TRACED = 1e-3
+"""Share of itself that the gap falls by from one entry of a trace to the next: some thousand entries at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,9 @@ class SearchResult:
         Whether the time limit ended it: another run may then end elsewhere.
     kernels : str
         What computed the bounds: "compiled" or "numpy".
+    trace : tuple of SearchProgress
+        Value, bound and cells against seconds since the search began: whenever the value rose or the gap fell by
+        `TRACED` of itself. On the sphere the first are from the search of rotations, where the bound on all is trivial.
     """
 
     mobius: Mobius
@@ -52,6 +59,7 @@ class SearchResult:
     cancelled: bool = False
     out_of_time: bool = False
     kernels: str = ""
+    trace: tuple[SearchProgress, ...] = field(default=(), repr=False)
     counted: tuple[Matching, Mobius] | None = field(default=None, repr=False)
     """The problem, and the transformation as it takes it."""
 

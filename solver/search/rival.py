@@ -54,6 +54,7 @@ def best_rival(
     *,
     z_max: float,
     enough: float | None = None,
+    at_least: int = LOOKED_AT,
     time_limit: float | None,
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
@@ -68,7 +69,7 @@ def best_rival(
     z_max, time_limit, threads, progress :
         As for `search`.
     enough : float, optional
-        The search ends as soon as it is decided whether a rival has this Q, and `LOOKED_AT` cells have been.
+        The search ends as soon as it is decided whether a rival has this Q, and `at_least` cells have been looked at.
     """
     reflected = known[0].reflected
     seen = np.conj(objective.source) if reflected else objective.source
@@ -85,7 +86,7 @@ def best_rival(
         threads=threads,
         progress=progress,
         enough=enough,
-        at_least=LOOKED_AT,
+        at_least=at_least,
     )
     if found.cancelled:
         return None

@@ -1,8 +1,9 @@
 """The best Möbius transformation of the sphere: rotations proved first, then all six degrees with a bound on |h|.
 
 The group of the sphere is not compact either, and centring by area takes out nearly all of what is not a rotation. So
-the rotations, three degrees of which one is stabbed exactly, are searched to the end; from the best of them a pattern
-search climbs in all six; then branch and bound goes over all transformations with |h| <= h_max, from there.
+the rotations, three degrees of which one is stabbed exactly, are searched to the end (`sphere_rotations`); from the
+best of them a pattern search climbs in all six; then branch and bound goes over all transformations with |h| <= h_max,
+halving boxes of matrices (`box_bounds`).
 """
 
 from __future__ import annotations
@@ -18,21 +19,36 @@ import numpy.typing as npt
 
 from ..mobius import SphereMobius
 from ..stages import SearchProgress
-from ..surface.mesh import Floats
-from .branch_and_bound import CENTRES, NEAR, SMALLEST_CELL, Search, require_ends
-from .kernels import MOST_POINTS
-from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
-from .kernels.sphere_kernels import sphere_kernels_for
-from .kernels.sphere_nodes import BALL, HX, HZ, whole_sphere
+from ..surface.mesh import Booleans, Floats
+from .box_bounds import place_of, transformation
+from .branch_and_bound import FRONTIER, SMALLEST_CELL, Search, require_ends
+from .kernels.box_kernels import box_kernels_for
+from .kernels.boxes import BOUND, COLUMNS, LARGEST, MIDDLE, SIDES, coefficients, points, whole_group
 from .outcome import SearchResult
-from .sphere_bounds import transformation
 from .sphere_matching import MOST_H, SphereMatching, sphere_matching
+from .sphere_rotations import Rotations, never
+from .sphere_seeds import seeds
 from .watch import watched
 
 _IDENTITY = SphereMobius()
 
 FIRST_STEP, LAST_STEP = 0.1, 1e-4
-"""Of the climb from the best rotation, in radians and in h."""
+"""Of the climb from the best rotation: coefficients of matrices, half an angle or h."""
+
+AT_ONCE = 1024
+"""Open boxes taken on in one round of all transformations."""
+
+LOOKED_AT = 128
+"""Boxes of a round in whose middles a better transformation is looked for: some tenth of the round's time."""
+
+CLIMBED = 1 / 8
+"""Transformations looked at in climbs that begin below the best value, over boxes bounded."""
+
+WAYS = 24
+"""Directions of a climb beside those of the coefficients: steps of one alone get stuck on ridges."""
+
+SHARE = 0.7
+"""Of the present gap: what bounds are brought down to in one round, so that the gap falls everywhere alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,55 +171,78 @@ def sphere_search(
     return state.outcome(time.perf_counter() - started, cancelled)
 
 
-def _never(value: float, bound: float, nodes: int) -> bool:
-    del value, bound, nodes
-    return False
-
-
 class _SphereSearch(Search):
     """The state of one search on the sphere."""
 
     identity = SphereMobius()
+    bound_at, half_at = BOUND, LARGEST
+    at_once = AT_ONCE
 
     def __init__(self, h_max: float, limit: float, gap: float, most_nodes: int | None) -> None:
-        super().__init__(h_max, limit, _never)
+        super().__init__(h_max, limit, self._is_enough)
         self.gap, self.most_nodes = gap, np.inf if most_nodes is None else most_nodes
-        self.climbs_h = False
-        self.hold = (0, whole_sphere(limit, 0)[0], 0.0)  # side, cell and angle of the best
-        self.rotation, self.rotation_value, self.rotation_bound = SphereMobius(), 0.0, limit
+        self.turns = Rotations(0.0, limit, never)
+        self.turns.halt = self.halt
+        self.rotation, self.rotation_value, self.rotation_bound = self.identity, 0.0, limit
+        self.climbed = 0
+        ways = np.random.default_rng(0).normal(size=(WAYS, 6))
+        self.ways = np.concatenate([np.eye(6), -np.eye(6), ways / np.linalg.norm(ways, axis=1, keepdims=True)])
 
     def begin(self, plain: SphereMatching, reflect: bool) -> None:
         """Set up what the search needs."""
-        self.sides = [plain, plain.reflected()] if reflect else [plain]
-        self.unlooked = self.rotation_bound = plain.limit
-        self.value, self.matches = plain.evaluated(self.best, self.check)
-        self.kernels = [sphere_kernels_for(plain, self.z_max, SMALLEST_CELL, MOST_POINTS, self.halt)]
-        if reflect:
-            self.kernels.append(self.kernels[0].reflected())
-        self.frontier = [whole_sphere(problem.limit, 0) for problem in self.sides]
+        self.unlooked = plain.limit
+        self.turns.begin(plain, reflect)
+        self.sides, self.kernels = self.turns.sides, self.turns.kernels
 
     def run(self, deadline: float, threads: int) -> None:
         """Search the rotations to their end, climb from the best, and search all."""
-        if self.z_max == 0:
-            self.unlooked = -np.inf
+        turns = self.turns
         try:
-            super().run(deadline, threads)
+            turns.run(deadline, threads)
         finally:  # valid wherever it was called off
-            tops = [open_[:, BOUND].max(initial=-np.inf) for open_ in self.frontier]
-            self.rotation, self.rotation_value = self.best, self.value
-            self.rotation_bound = float(max(self.value, self.finished_bound, *tops))
+            self.best, self.best_side = turns.best, turns.best_side
+            self.value, self.matches = turns.value, turns.matches
+            self.rotation, self.rotation_value, self.rotation_bound = turns.best, turns.value, turns.upper_bound
+            self.nodes, self.out_of_time = turns.nodes, turns.out_of_time
+            if self.z_max == 0:
+                self.finished_bound, self.unlooked, self.ended = turns.upper_bound, -np.inf, turns.ended
+            before = self.unlooked if self.z_max else -np.inf  # of all, nothing is proved yet
+            self.trace = [replace(x, upper_bound=max(x.upper_bound, before)) for x in turns.trace]
         if self.z_max == 0 or self.out_of_time:
             return
-        self.ended = False
-        side, cell, phi = self.hold
-        self.climbs_h = True
-        self._climb(side, cell, phi, self.value, FIRST_STEP)
-        self.until = lambda value, bound, nodes: (
-            nodes >= self.most_nodes or (self.gap > 0 and bound <= value * (1 + self.gap))
-        )
-        self.frontier = [whole_sphere(problem.limit, self.z_max) for problem in self.sides]
-        self.finished_bound, self.unlooked = -np.inf, -np.inf
+        self.kernels = [box_kernels_for(side, self.z_max, SMALLEST_CELL, self.halt) for side in self.sides]
+        self.frontier = [whole_group(x.limit, y.width) for x, y in zip(self.sides, self.kernels, strict=True)]
+        self.unlooked = -np.inf
+        self._climb(self.best_side, place_of(self._plain(self.best)), self.value, FIRST_STEP)
+        for side, problem in enumerate(self.sides):
+            for some in seeds(problem, self.z_max):
+                if self.value < problem.limit:
+                    self._look(side, points(some), FIRST_STEP / 8)
         super().run(deadline, threads)
+
+    def progress(self, seconds: float) -> SearchProgress:
+        """Return what was proved when the last round ended."""
+        if self.frontier or self.z_max == 0:
+            return super().progress(seconds) if self.frontier else self.turns.progress(seconds)
+        value, _, nodes = self.turns.proved
+        return SearchProgress(value, self.unlooked, nodes, seconds)
+
+    def _is_enough(self, value: float, bound: float, nodes: int) -> bool:
+        return nodes >= self.most_nodes or (self.gap > 0 and bound <= value * (1 + self.gap))
+
+    @property
+    def _enough(self) -> float:
+        """What bounds need not fall below."""
+        return self.value * (1 + self.gap)
+
+    def _settled(self, cells: Floats) -> Booleans:
+        return super()._settled(cells) | (cells[:, BOUND] <= self._enough)
+
+    def _limits(self) -> tuple[float, ...]:
+        """Return what bounds are held against, and what is low enough for this round."""
+        if sum(map(len, self.frontier)) > FRONTIER:
+            return self.value, self._enough
+        return self.value, max(self._enough, self.value + SHARE * (self.upper_bound - self.value))
 
     def outcome(self, seconds: float, cancelled: bool) -> SphereSearchResult:
         """Return the outcome, wherever the search has been called off."""
@@ -220,51 +259,50 @@ class _SphereSearch(Search):
         return SphereMobius(best.h, best.rotation)
 
     def _improve(self, side: int, left: Floats) -> None:
-        """Look for a better transformation in the middle of the most promising cells, then around the best of them."""
-        inside = left[(left[:, HX : HZ + 1] ** 2).sum(axis=1) <= self.z_max**2]
-        inside = inside[np.argsort(-inside[:, BOUND], kind="stable")[:CENTRES]]
-        if len(inside) == 0:
+        """Look for a better transformation in the middle of the most promising boxes, and around the best of them."""
+        chosen = left[np.argsort(-left[:, BOUND], kind="stable")[:LOOKED_AT]]
+        if len(chosen) == 0:
             return
-        values, angles = self.kernels[side].rotations(inside, self.value, inside[:, [FROM, WIDTH]])
-        k = int(np.argmax(values))
-        if values[k] > self.value:
-            cell = inside[k]
-            self._climb(side, cell, float(angles[k]), float(values[k]), float(max(cell[HALF], cell[BALL])))
+        middles = chosen[:, :COLUMNS].copy()
+        middles[:, SIDES] = 0
+        low = 2 * self.value - self.upper_bound  # as far below as the bound is above
+        self._look(side, middles, float(chosen[:, LARGEST].max()), low if self.climbed < CLIMBED * self.nodes else None)
 
-    def _climb(self, side: int, cell: Floats, phi: float, value: float, step: float) -> None:
-        """Climb from a cell's middle by a pattern search: the value is a step function, so there is no slope."""
-        here = cell.copy()
-        here[[HALF, BALL]] = 0
-        ring = np.exp(2j * np.pi * np.arange(8) / 8)
-        ways = np.zeros((14 if self.climbs_h else 8, 5))
-        ways[:8, 0], ways[:8, 1] = ring.real, ring.imag
-        ways[8:, 2:] = np.concatenate([np.eye(3), -np.eye(3)]) if self.climbs_h else 0
+    def _look(self, side: int, places: Floats, step: float, low: float | None = None) -> None:
+        """Climb from the best of some boxes without extent, if it is worth more than `low`, or than the best so far."""
+        self.check()
+        low = self.value if low is None else low
+        values = self.kernels[side].bounds(places, low)
+        k = int(np.argmax(values))
+        if values[k] > low:
+            self._climb(side, places[k], float(values[k]), step)
+
+    def _climb(self, side: int, box: Floats, value: float, step: float) -> None:
+        """Climb from a box's middle by a pattern search: the value is a step function, so there is no slope."""
+        here = box.copy()
+        here[SIDES] = 0
         while step > LAST_STEP:
             self.check()
-            around = np.repeat(here[None], len(ways), axis=0)
-            scale = np.sqrt(1 + here[X] ** 2 + here[Y] ** 2)
-            around[:, [X, Y]] += step * scale * ways[:, :2]
-            around[:, HX : HZ + 1] += step * ways[:, 2:]
-            around = around[(around[:, HX : HZ + 1] ** 2).sum(axis=1) <= self.z_max**2]
-            near = np.tile([phi / (2 * np.pi) - 0.5 * NEAR, NEAR], (len(around), 1))
-            values, angles = self.kernels[side].rotations(around, value, near)
-            k = int(np.argmax(values)) if len(values) else -1
-            if k >= 0 and values[k] > value:
-                here, value, phi = around[k], float(values[k]), float(angles[k])
+            around = np.repeat(here[None], len(self.ways), axis=0)
+            around[:, MIDDLE] += step * self.ways
+            around = points(coefficients(around))
+            values = self.kernels[side].bounds(around, value)
+            self.climbed += len(around)
+            k = int(np.argmax(values))
+            if values[k] > value:
+                here, value = around[k], float(values[k])
             else:
                 step /= 2
-        found = transformation(here, phi)
-        before = self.value
-        self._offer(side, found)
-        if self.value > before:
-            self.hold = side, here, phi
+        if value > self.value:
+            self._offer(side, here)
 
-    def _offer(self, side: int, found: SphereMobius) -> None:
+    def _offer(self, side: int, found: Floats) -> None:
         """Take a transformation if it is better, and within the bound on |h| to its last digit."""
-        value, matches = self.sides[side].evaluated(found, self.check)
-        if value > self.value and h_within(found.h, self.z_max):
+        mobius = transformation(found)
+        value, matches = self.sides[side].evaluated(mobius, self.check)
+        if value > self.value and h_within(mobius.h, self.z_max):
             self.value, self.matches, self.best_side = value, matches, side
-            self.best = SphereMobius(found.h, found.rotation, side == 1)
+            self.best = SphereMobius(mobius.h, mobius.rotation, side == 1)
 
 
 def h_within(h: tuple[float, float, float], h_max: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -55,11 +56,22 @@ def cleaned(
     >>> result.mesh.faces.tolist(), result.changes
     ([[0, 1, 2], [0, 2, 3]], ('1 face with a vertex used twice left out', '1 face turned over'))
     """
-    found = _cleaned(mesh, largest_part, fill_holes, keys)
+    found, moved = _cleaned(mesh, largest_part, fill_holes, keys)
+    belong, where = _across(found, moved)
+    if len(belong):
+        positions, others = mesh.vertices.copy(), None if keys is None else keys.copy()
+        for values in (positions, others):
+            if values is not None:
+                values[belong] = values[where]
+        again = TriangleMesh(positions, mesh.faces, mesh.name)
+        found, further = _cleaned(again, largest_part, fill_holes, others)
+        found = replace(found, changes=tuple(said for said in found.changes if not said.endswith(PUT_BACK)))
+        found = _with_word(found, len(belong) + len(further))
     return found.without_pinholes() if fill_holes else found
 
 
-def _cleaned(mesh: TriangleMesh, largest_part: bool, fill_holes: bool, keys: Floats | None) -> Cleaned:
+def _cleaned(mesh: TriangleMesh, largest_part: bool, fill_holes: bool, keys: Floats | None) -> tuple[Cleaned, Integers]:
+    """Return the mesh in order but for pinholes, and which of its vertices were spikes."""
     work = _Work(mesh, largest_part)
     if work.in_order_but_for_sides(keys):
         return work.result()
@@ -72,6 +84,30 @@ def _cleaned(mesh: TriangleMesh, largest_part: bool, fill_holes: bool, keys: Flo
     if fill_holes:
         work.cut_handles(glue)
     return work.result()
+
+
+PUT_BACK = "far off the surface put back"
+"""How what is said of spikes ends."""
+
+
+def _with_word(tidy: Cleaned, spikes: int) -> Cleaned:
+    return replace(tidy, changes=(*tidy.changes, f"{plural(spikes, 'vertex')} {PUT_BACK}"))
+
+
+def _across(tidy: Cleaned, moved: Integers) -> tuple[Integers, Integers]:
+    """Return the original vertices that are spikes beside an opening of four edges, and those opposite there.
+
+    Where a surface is cut open the one that was to lie on it tears the cut open: there it belongs.
+    """
+    if not moved.size:
+        return moved, moved
+    spike = np.zeros(len(tidy.mesh.vertices), bool)
+    spike[moved] = True
+    loops = np.array([loop for loop in topology(tidy.mesh).boundary_loops if len(loop) == 4], np.intp).reshape(-1, 4)
+    loops = loops[spike[loops].sum(axis=1) == 1]
+    at = spike[loops].argmax(axis=1)
+    row = np.arange(len(loops))
+    return tidy.origin[loops[row, at]], tidy.origin[loops[row, (at + 2) % 4]]
 
 
 LEFT_OUT = ("smaller part left out", "smaller parts left out", "other part left out", "other parts left out")
@@ -112,7 +148,12 @@ class _Work:
 
     @property
     def areas(self) -> Floats:
-        return self.mesh.face_areas[self.kept]
+        return self.calm.face_areas[self.kept]
+
+    @cached_property
+    def calm(self) -> TriangleMesh:
+        """The mesh without spikes, the faces of which would outweigh all others."""
+        return without_spikes(self.mesh)[0]
 
     def _keep(self, chosen: Booleans) -> None:
         self.kept, self.faces, self.turned = self.kept[chosen], self.faces[chosen], self.turned[chosen]
@@ -148,8 +189,13 @@ class _Work:
         joints = coinciding(self.mesh.vertices, self.faces, apart, keys)
         if not joints.left.size or self._closed_by(joints, apart):
             return apart
-        self.changes.append(f"{plural(len(joints.left), 'edge')} joined along which it is cut open")
-        return apart.with_others(joints)
+        joined, glue = len(joints.left), apart.with_others(joints)
+        while not joints.opposed.all():  # parts that now face one side may touch along more
+            glue = self._turned_to(glue)
+            joints = coinciding(self.mesh.vertices, self.faces, glue, keys)
+            joined, glue = joined + len(joints.left), glue.with_others(joints)
+        self.changes.append(f"{plural(joined, 'edge')} joined along which it is cut open")
+        return glue
 
     def _require_manifold(self, edge: Integers) -> None:
         """Raise if edges of three or more faces are left in what will be kept."""
@@ -168,7 +214,10 @@ class _Work:
             )
 
     def _closed_by(self, joints: Glue, apart: Glue) -> bool:
-        """Return whether joining closes a surface, or makes a handle, that someone has cut open to a disc."""
+        """Return whether joining closes a surface that someone has cut open, or makes a handle of one with itself.
+
+        A handle that is there once islands are joined to each other is one of the surface.
+        """
         m, areas = len(self.faces), self.areas
         whole = apart.with_others(joints)
         part, before = whole.parts(m), apart.parts(m)
@@ -176,8 +225,9 @@ class _Work:
         main = before == np.argmax(np.bincount(before, areas * largest))
         if areas[main].sum() < CUT_OPEN * areas[largest].sum():
             return False
-        loops, handles = shape_of(int(largest.sum()), whole.among(largest))
+        loops, _ = shape_of(int(largest.sum()), whole.among(largest))
         own_loops, own_handles = shape_of(int(main.sum()), apart.among(main))
+        handles = shape_of(int(main.sum()), whole.among(main))[1]
         return (loops == 0 or handles > own_handles) and own_loops > 0
 
     def keep_largest_part(self, glue: Glue) -> Glue:
@@ -237,8 +287,8 @@ class _Work:
             self.changes.append(f"{plural(len(lengths), 'handle')} cut through")
             self._name(*named)
 
-    def result(self) -> Cleaned:
-        """Return the mesh in order."""
+    def result(self) -> tuple[Cleaned, Integers]:
+        """Return the mesh in order, and which of its vertices were spikes."""
         name = self.original.name
         positions = self.mesh.vertices
         if not self.changes:
@@ -247,9 +297,6 @@ class _Work:
         tidy = (self.kept, self.turned, tuple(self.changes), self.original.faces, self.vertex_of, self.origin)
         return self._without_spikes(Cleaned(mesh, *tidy))
 
-    def _without_spikes(self, tidy: Cleaned) -> Cleaned:
+    def _without_spikes(self, tidy: Cleaned) -> tuple[Cleaned, Integers]:
         mesh, moved = without_spikes(tidy.mesh)
-        if not moved.size:
-            return tidy
-        said = f"{plural(len(moved), 'vertex')} far off the surface put back"
-        return replace(tidy, mesh=mesh, changes=(*tidy.changes, said))
+        return (_with_word(replace(tidy, mesh=mesh), len(moved)) if moved.size else tidy), moved

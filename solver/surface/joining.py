@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from .gluing import Glue, starts, stops
 from .mesh import Floats, Integers
+from .spikes import LONG
 
 TOUCHING = 1e-6
 """Distance, in diagonals, up to which boundary vertices lie in one place; at most a hundredth of the edges there."""
@@ -66,6 +67,7 @@ def coinciding(positions: Floats, faces: Integers, glue: Glue, keys: Floats | No
         return found
     whole = glue.with_others(found)
     length = np.linalg.norm(positions[stops(faces)] - positions[starts(faces)], axis=1)
+    length = np.minimum(length, LONG * np.median(length))  # or a single spike would be most of a boundary
     return found.with_others(_turned_parts(whole, length, one[~opposed], other[~opposed]))
 
 

@@ -8,7 +8,9 @@ from scipy.sparse import csr_array
 from .mesh import Booleans, Floats, Integers, TriangleMesh, directed_edges
 
 SHARP = 0.3
-"""Sum of the angles at a vertex, in radians, below which it is a spike: twenty times as high as it is wide."""
+"""Sum of the angles at a vertex, in radians, below which it is a spike: twenty times as high as it is wide. On the rim
+a sixth of it, as there hands and heads that were cut out of bodies have thin triangles: with the whole of it 1 to 5
+vertices of each would be put back."""
 
 LONG, LONG_ON_RIM = 3, 20
 """A spike's edges are longer than so many usual ones, of the mesh and of those around it: where all triangles are thin,
@@ -27,28 +29,32 @@ def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, Integers]:
         sharp = np.setdiff1d(_sharp(vertices, mesh.faces, on_rim), moved)
         if not sharp.size:
             break
-        vertices = vertices.copy()
-        vertices[sharp] = _between(vertices, mesh.faces, sharp)
-        moved = np.concatenate([moved, sharp])
-    return (TriangleMesh(vertices, mesh.faces, mesh.name), np.sort(moved)) if moved.size else (mesh, moved)
+        moved = np.union1d(moved, sharp)
+        vertices = _without(vertices, mesh.faces, moved)
+    return (TriangleMesh(vertices, mesh.faces, mesh.name), moved) if moved.size else (mesh, moved)
 
 
 def _sharp(vertices: Floats, faces: Integers, on_rim: Booleans) -> Integers:
-    """Return the vertices that are spikes: inside by their angles, on the rim by the length of their edges too."""
+    """Return the vertices that are spikes: by the length of their edges, and by their angles.
+
+    Of two spikes beside each other neither counts for the angle of the other.
+    """
     n, corners = len(vertices), vertices[faces]
     to_next, to_last = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    sine = np.sqrt((np.cross(to_next, to_last) ** 2).sum(axis=2))
-    angles = np.arctan2(sine, (to_next * to_last).sum(axis=2))
-    total = np.bincount(faces.ravel(), angles.ravel(), n)
-    count = np.bincount(faces.ravel(), minlength=n)
     length = np.sqrt((to_next**2).sum(axis=2))
     nearest = np.full(n, np.inf)
     np.minimum.at(nearest, faces.ravel(), length.ravel())
     np.minimum.at(nearest, faces[:, [1, 2, 0]].ravel(), length.ravel())
-    usual = np.median(length)
     times = np.where(on_rim, LONG_ON_RIM, LONG)
-    found = np.flatnonzero((count > 0) & (total < np.where(on_rim, SHARP / 6, SHARP)) & (nearest > times * usual))
-    return found[nearest[found] > times[found] * _usual_around(vertices, faces, found)]
+    far = np.flatnonzero(np.isfinite(nearest) & (nearest > times * np.median(length)))
+    far = far[nearest[far] > times[far] * _usual_around(vertices, faces, far)]
+    is_far = np.zeros(n, bool)
+    is_far[far] = True
+    sine = np.sqrt((np.cross(to_next, to_last) ** 2).sum(axis=2))
+    angles = np.arctan2(sine, (to_next * to_last).sum(axis=2))
+    beside = is_far[np.roll(faces, 1, axis=1)] | is_far[np.roll(faces, -1, axis=1)]
+    total = np.bincount(faces.ravel(), np.where(beside, 0, angles).ravel(), n)
+    return far[total[far] < np.where(on_rim[far], SHARP / 6, SHARP)]
 
 
 def _usual_around(vertices: Floats, faces: Integers, chosen: Integers) -> Floats:
@@ -70,11 +76,22 @@ def _usual_around(vertices: Floats, faces: Integers, chosen: Integers) -> Floats
     return result
 
 
-def _between(vertices: Floats, faces: Integers, chosen: Integers) -> Floats:
-    """Return the middle of the neighbours of each chosen vertex."""
+def _without(vertices: Floats, faces: Integers, chosen: Integers) -> Floats:
+    """Return the vertices with the chosen ones in the middle of their neighbours that are not chosen.
+
+    Those that have none come after these, one ring after the other.
+    """
     start, stop = directed_edges(faces).T
-    both = np.concatenate([start, stop]), np.concatenate([stop, start])
-    n = len(vertices)
-    count = np.bincount(both[0], minlength=n)
-    total = np.stack([np.bincount(both[0], column[both[1]], n) for column in vertices.T], axis=1)
-    return total[chosen] / count[chosen, None]
+    one, other = np.concatenate([start, stop]), np.concatenate([stop, start])
+    n, vertices = len(vertices), vertices.copy()
+    placed = np.ones(n, bool)
+    placed[chosen] = False
+    while True:
+        known = placed[other] & ~placed[one]
+        count = np.bincount(one[known], minlength=n)
+        ring = np.flatnonzero(count)
+        if not ring.size:
+            return vertices
+        total = np.stack([np.bincount(one[known], column[other[known]], n) for column in vertices.T], axis=1)
+        vertices[ring] = total[ring] / count[ring, None]
+        placed[ring] = True

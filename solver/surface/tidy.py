@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ from .gluing import glue_of, vertices_of_glue
 from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, directed_edges, plural
 
 Value = TypeVar("Value", bound=np.generic)
+
+Piece: TypeAlias = Booleans | Integers
+"""What is used of a mesh: the largest piece among these vertices, (n,) bool, or between these edges, (k, 2) int."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +80,37 @@ class Cleaned:
         )
 
     def without_pinholes(self) -> Cleaned:
-        """Return it with a face in each opening of three edges, but for the longest boundary."""
+        """Return it with a face in each opening of three edges, but for the longest boundary.
+
+        What hangs on the surface by three edges about such a face, as what is left of a tube that was cut through does,
+        gives way to one.
+        """
         mesh = self.mesh
         loops = pinholes(mesh)
         if not len(loops):
             return self
         said = f"{plural(len(loops), 'missing triangle')} put in"
-        return replace(
+        whole = replace(
             self,
             mesh=TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, loops]), mesh.name),
             faces=np.concatenate([self.faces, np.full(len(loops), -1)]),
             reversed=np.concatenate([self.reversed, np.zeros(len(loops), bool)]),
             changes=(*self.changes, said),
+        )
+        kept, feet = _without_stubs(whole.mesh, loops)
+        if not len(feet):
+            return whole
+        gone = whole.mesh.faces[~kept]
+        faces = np.concatenate([whole.mesh.faces[kept], feet])
+        used = np.zeros(len(mesh.vertices), bool)
+        used[faces] = True
+        lost = np.setdiff1d(gone, np.flatnonzero(used))
+        return replace(
+            whole,
+            mesh=TriangleMesh(mesh.vertices, faces, mesh.name),
+            faces=np.concatenate([whole.faces[kept], np.full(len(feet), -1)]),
+            reversed=np.concatenate([whole.reversed[kept], np.zeros(len(feet), bool)]),
+            vertex_of=np.where(np.isin(self.vertex_of, lost), -1, self.vertex_of),
         )
 
     @property
@@ -134,14 +156,20 @@ class Cleaned:
         return np.bincount(self.origin, areas, self.size).astype(np.float64, copy=False) if self.changes else areas
 
 
-def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
-    """Return the largest piece of a mesh in order that lies among some of the original's vertices, (n_original,).
+def piece_within(tidy: Cleaned, within: Piece) -> Cleaned:
+    """Return the largest piece of a mesh in order among some of the original's vertices, or between some of its edges.
 
     Raises
     ------
     MeshError
-        No face does.
+        No face lies among the vertices, or none of the edges is inside the surface.
     """
+    if within.dtype == np.bool_:
+        return _among(tidy, within.astype(np.bool_, copy=False))
+    return _cut_open(tidy, within.astype(np.int64, copy=False))
+
+
+def _among(tidy: Cleaned, inside: Booleans) -> Cleaned:
     mesh = tidy.mesh
     chosen = inside[tidy.origin][mesh.faces].all(axis=1)
     if not chosen.any():
@@ -152,6 +180,54 @@ def piece_within(tidy: Cleaned, inside: Booleans) -> Cleaned:
     chosen[place[part != np.argmax(area)]] = False
     share = float(mesh.face_areas[chosen].sum() / mesh.area)
     return tidy.only(chosen, f"cut to a piece of {share:.1%} of its area, as asked; the rest has no counterpart")
+
+
+def _cut_open(tidy: Cleaned, edges: Integers) -> Cleaned:
+    mesh, size = tidy.mesh, len(tidy.mesh.vertices)
+    whole = glue_of(mesh.faces, mesh.twins)
+    # by the vertices as they came, so that those that became several are told as one
+    ends = np.sort(tidy.origin[tidy.vertices_for(edges)], axis=1)
+    sides = np.sort(tidy.origin[directed_edges(mesh.faces)], axis=1)
+    marked = np.isin(sides @ [tidy.size, 1], ends @ [tidy.size, 1])
+    inner = int((marked & (mesh.twins >= 0)).sum()) // 2
+    if not inner:
+        raise MeshError(f"'{mesh.name}' has none of the edges inside along which it was to be cut open: mark others")
+    faces, vertex_of, origin = vertices_of_glue(mesh.faces, whole.without(np.flatnonzero(marked)), size)
+    opened = replace(
+        tidy,
+        mesh=TriangleMesh(mesh.vertices[origin], faces, mesh.name),
+        changes=(*tidy.changes, f"cut open along {plural(inner, 'edge')}, as asked"),
+        vertex_of=np.where(tidy.vertex_of >= 0, vertex_of[tidy.vertex_of], -1),
+        origin=tidy.origin[origin],
+    )
+    part = glue_of(faces, opened.mesh.twins).parts(len(faces))
+    area = np.bincount(part, mesh.face_areas)
+    if len(area) == 1:
+        return opened
+    largest = area.argmax()
+    share = area[largest] / mesh.area
+    return opened.only(part == largest, f"to a piece of {share:.1%} of its area; the rest has no counterpart")
+
+
+def _without_stubs(mesh: TriangleMesh, caps: Integers) -> tuple[Booleans, Integers]:
+    """Return which faces, (m,), are not about one of some faces and hang on the rest by three edges; and these, (k, 3).
+
+    None where a vertex of the cap is one of the three edges'.
+    """
+    kept, feet = np.ones(len(mesh.faces), bool), []
+    ends = directed_edges(mesh.faces)
+    for cap in caps:
+        stub = np.isin(mesh.faces, cap).any(axis=1)
+        sides = np.flatnonzero(np.repeat(stub, 3))
+        out = sides[(mesh.twins[sides] < 0) | ~stub[mesh.twins[sides] // 3]]
+        start, stop = ends[out].T
+        ring = len(out) == 3 and (mesh.twins[out] >= 0).all() and set(start.tolist()) == set(stop.tolist())
+        if ring and kept[stub].all() and not np.isin(start, cap).any():
+            kept[stub] = False
+            first = start[0]
+            second = stop[0]
+            feet.append([first, second, stop[start == second][0]])
+    return kept, np.array(feet, np.intp).reshape(-1, 3)
 
 
 def pinholes(mesh: TriangleMesh) -> Integers:

@@ -35,17 +35,16 @@ class Verdict:
     @property
     def repairs(self) -> tuple[str, ...]:
         """What will be done for the computation, each as the rest of a sentence."""
-        if self.hanging:
-            return (*self.tidy.changes, self._cutting())
-        loops = list(self.topology.boundary_loops)
-        if not loops:
-            return self.tidy.changes
-        del loops[int(np.argmax(self.topology.loop_lengths))]
-        closed = closing(loops)
         changes = [
             said.removesuffix("left out") + "aligned beside it" if said.endswith(LEFT_OUT) else said
             for said in self.tidy.changes
         ]
+        if self.hanging:
+            return (*changes, self._cutting())
+        loops = list(self.topology.boundary_loops)
+        if loops:
+            del loops[int(np.argmax(self.topology.loop_lengths))]
+        closed = closing(loops)
         return (*changes, closed) if closed else tuple(changes)
 
     def describe(self) -> str:

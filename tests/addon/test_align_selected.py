@@ -71,3 +71,36 @@ def test_the_piece_that_a_group_names_is_what_is_matched() -> None:
     known = np.flatnonzero(found.face >= 0)
     assert len(known) > len(right) / 2
     assert set(known) <= set(right)
+
+
+def test_the_results_are_listed_and_a_click_chooses_one() -> None:
+    from mobius_extension.mobius_addon.panel import targets
+
+    source, first, second = (make_sheet(name, n) for name, n in (("S", 15), ("A", 11), ("B", 12)))
+    assert not targets.MOBIUS_PT_targets.poll(bpy.context)
+    choose(source, first, second)
+    bpy.ops.mobius.align_selected(**QUICK)
+    listed = {row.obj.name: row for row in targets.rows(bpy.context)}
+    assert set(listed) == {"A", "B"}
+    assert targets.MOBIUS_PT_targets.poll(bpy.context)
+    for name, row in listed.items():
+        report = stored_alignment.figures(bpy.data.objects[name])
+        assert report is not None
+        assert (row.level, row.coverage, row.warnings) == (
+            report["verdict"],
+            report["coverage"],
+            len(report["warnings"]),
+        )
+    assert bpy.ops.mobius.choose_target(object_name="B") == {"FINISHED"}
+    assert bpy.context.scene.mobius.target == second
+    assert [obj.name for obj in bpy.context.selected_objects] == ["B"]
+    assert bpy.context.object == second
+    with pytest.raises(RuntimeError, match="There is no mesh 'C'"):
+        bpy.ops.mobius.choose_target(object_name="C")
+    # what was edited comes first and says so; what is damaged too
+    second.data.vertices[0].co.x += 1
+    first.data.mobius_alignment.report = "{"
+    bpy.context.view_layer.update()
+    assert [(row.obj.name, row.level) for row in targets.rows(bpy.context)] == [("A", "damaged"), ("B", "edited")]
+    last = bpy.context.window_manager.operator_properties_last("mobius.choose_target")
+    assert "Make this mesh the target" in bpy.types.MOBIUS_OT_choose_target.description(bpy.context, last)

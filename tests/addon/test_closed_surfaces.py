@@ -8,7 +8,7 @@ from scenes import make_object, positions, weights
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import stored_alignment  # noqa: E402
+from mobius_extension.mobius_addon import proof, stored_alignment  # noqa: E402
 from mobius_extension.mobius_addon.attributes import SHARED_COLOR, SHARED_LAYOUT  # noqa: E402
 from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
@@ -53,6 +53,8 @@ def test_closed_surfaces_are_aligned_and_shown() -> None:
     for obj in (source, target):
         assert SHARED_COLOR in obj.data.attributes
         assert SHARED_LAYOUT not in obj.data.uv_layers
+    assert figures["rotation"]["certified"]
+    assert proof.shown(target, "certificate").startswith("no rotation matches more, no map with |h| <= 0.2")
     assert bpy.ops.mobius.side_by_side() == {"FINISHED"}
     assert bpy.ops.mobius.end_side_by_side() == {"FINISHED"}
     north = source.vertex_groups.new(name="North")

@@ -15,7 +15,14 @@ from scenes import QUICK, make_object, make_sheet, positions
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import jobs, panel, preset_menus, topology_cache  # noqa: E402
+from mobius_extension.mobius_addon import (  # noqa: E402
+    jobs,
+    panel,
+    preset_menus,
+    stored_alignment,
+    topology_cache,
+    verdict,
+)
 from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
 from mobius_extension.solver import Progress  # noqa: E402
@@ -134,7 +141,7 @@ def test_an_edit_changes_the_line() -> None:
 
 def test_everything_that_the_panels_show_exists(pair: tuple[Any, Any]) -> None:
     panels = [getattr(panel, name) for name in dir(panel) if name.startswith("MOBIUS_PT_") and "presets" not in name]
-    assert len(panels) == 14
+    assert len(panels) == 15
     for settings in ({"source": None}, {"source": pair[0]}):
         for name, value in settings.items():
             setattr(bpy.context.scene.mobius, name, value)
@@ -461,3 +468,15 @@ def test_what_is_kept_and_replaced_is_said_above_the_button(pair: tuple[Any, Any
     bpy.context.scene.mobius.target = source
     bpy.context.scene.mobius.carry_to = "target"
     assert not [line for line in drawn(panel.MOBIUS_PT_transfer) if "on the target" in line]
+
+
+def test_what_align_reports_is_what_the_panel_says(pair: tuple[Any, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    """In the same words and figures, so in the interface's language."""
+    source, target = pair
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    found = stored_alignment.figures(target)
+    assert found is not None
+    rows = verdict.verdict_lines(bpy.context.scene, source, found, verdict.judgement_of(found).level)
+    assert len(rows) == 3
+    said = next(line for line in capfd.readouterr().out.splitlines() if "'Source' → 'Target'" in line)
+    assert said == f"Info: 'Source' → 'Target': {'; '.join(rows)}"

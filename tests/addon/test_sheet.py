@@ -70,3 +70,13 @@ def test_what_no_sheet_can_show_is_refused(pair, given, said, tmp_path, capsys, 
     assert main(["transfer", f"{pair}:Source", f"{pair}:Target", "-o", "out.blend", *given]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out.blend").exists()
+
+
+def test_lips_that_close_are_shown_over_the_open_jaw() -> None:
+    from mobius_extension.mobius_addon.sheet import together
+
+    keys = [("Mouth_Close", "mouthClose"), ("jaw_open", "jawOpen"), ("eyeBlink_L", "eyeBlink_L")]
+    assert together(keys[0], keys) == keys[:2]
+    assert together(keys[0], keys[:1]) == keys[:1]
+    assert together(keys[1], keys) == [keys[1]]
+    assert together(keys[2], keys) == [keys[2]]

@@ -469,7 +469,7 @@ def test_the_operator_carries_pictures(pair: tuple[Any, Any]) -> None:
     assert [x.name for x in target.data.uv_layers if x.active_render] == ["UVMap"]
 
 
-def test_side_by_side_previews_the_pictures_before_they_are_transferred(pair: tuple[Any, Any]) -> None:
+def test_side_by_side_previews_the_pictures_before_they_are_transferred(pair: tuple[Any, Any], tmp_path: Path) -> None:
     """On a copy with a mesh of its own: the target stays as it was, and the end takes everything away."""
     source, target = pair
     picture = smooth()
@@ -495,6 +495,19 @@ def test_side_by_side_previews_the_pictures_before_they_are_transferred(pair: tu
         assert not target.material_slots
         assert [x.name for x in target.data.uv_layers] == uv_maps
         assert counts() == (before[0] + 2, *(x + 1 for x in before[1:]))
+    # a file that is saved meanwhile has nothing of it, but for what a person took for themselves
+    for taken in (False, True):
+        path = str(tmp_path / "saved.blend")
+        source.material_slots[0].link = "OBJECT"
+        source.material_slots[0].material = copy.data.materials[0] if taken else None
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        with bpy.data.libraries.load(path) as (held, _):
+            assert len(held.objects) == before[0]
+            assert len(held.meshes) == before[1]
+            assert len(held.materials) == before[2] + taken
+            assert len(held.images) == before[3] + taken
+    source.material_slots[0].material = None
+    source.material_slots[0].link = "DATA"
     # what is transferred shows the same, in another size
     settings.texture_size = 512
     assert bpy.ops.mobius.transfer(kinds={"TEXTURES"}, texture_size=512) == {"FINISHED"}

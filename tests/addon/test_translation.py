@@ -33,6 +33,19 @@ def test_whatever_is_refused_or_reported_is_translated() -> None:
     assert sorted(sentences - set(GERMAN_SENTENCES)) == []
 
 
+def filled_in(text: str) -> list[tuple[str | None, str | None]]:
+    return [(name, form) for _, name, form, _ in string.Formatter().parse(text) if name is not None]
+
+
+@pytest.mark.parametrize("language", translation.LANGUAGES)
+def test_every_language_has_every_text(language: str) -> None:
+    own = translation.LANGUAGES[language]
+    assert sorted((GERMAN | GERMAN_SENTENCES).keys() - own.keys()) == []
+    for english, text in own.items():
+        assert filled_in(english) == filled_in(text), english
+        assert english.endswith(":") == text.endswith(":"), english
+
+
 def test_every_stage_of_the_work_is_translated() -> None:
     found = set()
     for path in sorted((texts.ROOT / "solver").glob("**/*.py")):

@@ -14,7 +14,7 @@ from spheres import random_mobius, sphere_points, unit
 from solver.mobius import SphereMobius
 from solver.search.branch_and_bound import SMALLEST_CELL
 from solver.search.kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
-from solver.search.kernels.sphere_kernels import CompiledSphereKernels, SphereReferenceKernels, bound_sphere_cells
+from solver.search.kernels.sphere_kernels import CompiledSphereKernels, bound_sphere_cells
 from solver.search.kernels.sphere_nodes import BALL, FACE, HX, HZ, new_sphere_nodes
 from solver.search.sphere_bounds import FACES, enclosing_arcs, frames, transformation
 from solver.search.sphere_certificate import certify_sphere
@@ -27,18 +27,15 @@ TURN = 2 * np.pi
 @contextmanager
 def kernels_of(library: object | None) -> Iterator[None]:
     """Have searches on the sphere use one compiled library, or numpy."""
-    module, compiled = (sys.modules[f"solver.search.kernels.{name}"] for name in ("sphere_kernels", "compiled"))
-    search = sys.modules["solver.search.sphere_search"]
-    kept = module.library, compiled.library, search.sphere_kernels_for
-    module.library = compiled.library = lambda: library
-    if library is None:
-        search.sphere_kernels_for = lambda problem, h_max, smallest, _, halt: SphereReferenceKernels(
-            problem, h_max, smallest, halt
-        )
+    modules = [sys.modules[f"solver.search.kernels.{name}"] for name in ("sphere_kernels", "box_kernels", "compiled")]
+    kept = [module.library for module in modules]
+    for module in modules:
+        module.library = lambda: library
     try:
         yield
     finally:
-        module.library, compiled.library, search.sphere_kernels_for = kept
+        for module, before in zip(modules, kept, strict=True):
+            module.library = before
 
 
 def cornered_points(rng: np.random.Generator, count: int) -> np.ndarray:

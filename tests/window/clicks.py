@@ -103,7 +103,11 @@ def steps() -> Wait:
     assert bpy.context.space_data.local_view is None
     view.matches, view.lines = True, 0.3
     bpy.ops.mobius.show_discs()
+    bpy.context.space_data.show_region_ui = False  # what is left of the viewport is narrow
+    yield 1.0
+    bpy.ops.view3d.view_all()
     yield from picture("discs")
+    bpy.context.space_data.show_region_ui = True
     bpy.context.preferences.view.language = "de_DE"
     yield from picture("german")
     bpy.context.preferences.view.language = "en_US"
@@ -129,6 +133,7 @@ def steps() -> Wait:
     yield 1.0
     assert Job.current is None, "the work goes on after its file was closed"
     assert not bpy.context.window_manager.mobius_view.discs
+    yield from showing.opened(names)
     print("[clicks] done", flush=True)
 
 

@@ -69,20 +69,35 @@ def click_on(place: tuple[int, int]) -> Wait:
     over_the_viewport()
 
 
-def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False) -> Any:
-    """Return where the sidebar's button of a command is: move the mouse along and ask at each place."""
+def find(command: str, keys: str = "ctrl+c", *, upwards: bool = False, across: float = 0.5) -> Any:
+    """Return where the sidebar's button of a command is: move the mouse along and ask at each place.
+
+    `across` says where in the rows, from 0 at their left to 1.
+    """
     sidebar = region("UI")
-    x = sidebar.x + (sidebar.width - 24) // 2
+    x = sidebar.x + int((sidebar.width - 24) * across)
     top = screen_height() - (sidebar.y + sidebar.height)
     places = range(top + 30, top + sidebar.height - 5, STEP)
     for y in reversed(places) if upwards else places:
-        bpy.context.window_manager.clipboard = ""
-        pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", keys)
-        yield 0.1
-        if bpy.context.window_manager.clipboard.startswith(command):
+        if (yield from copied((x, y), keys)).startswith(command):
             print(f"[clicks] {command} is at {x}, {y}", flush=True)
             return x, y
     raise AssertionError(f"the sidebar shows nothing of {command}")
+
+
+def copied(place: tuple[int, int], keys: str = "ctrl+c") -> Any:
+    """Return what Blender copies of the button at a place when the mouse is moved there and these keys are pressed.
+
+    Blender has a turn after each move: those that come together are one to it, and it takes one to leave a menu and
+    another to come to what is beside it.
+    """
+    bpy.context.window_manager.clipboard = ""
+    for beside in (-2, 0):
+        pointer("mousemove", place[0] + beside, place[1])
+        yield 0.04
+    pointer("key", keys)
+    yield 0.1
+    return bpy.context.window_manager.clipboard
 
 
 def choose(role: str, obj: Any) -> Wait:

@@ -150,11 +150,8 @@ def set_factor(places: list[tuple[int, int]], factor: float) -> Wait:
     Looked for again where a slow machine has not answered in time.
     """
     manager = bpy.context.window_manager
-    for x, y in 3 * places:
-        manager.clipboard = ""
-        pointer("mousemove", x - 2, y, "sleep", 0.03, "mousemove", x, y, "sleep", 0.05, "key", "ctrl+c")
-        yield 0.15
-        if number(manager.clipboard) > 0.01:
+    for place in 3 * places:
+        if number((yield from hand.copied(place))) > 0.01:
             manager.clipboard = str(factor)
             pointer("key", "ctrl+v")
             return

@@ -4,9 +4,10 @@ import importlib
 from typing import Any
 
 import bpy
-from hand import Wait, picture, until
+from hand import SHOTS, Wait, over_the_viewport, picture, pointer, until
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
+SAVED = SHOTS / "saved.blend"
 
 
 def steps(package: str, names: tuple[str, str]) -> Wait:
@@ -30,6 +31,7 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     for _ in range(4):  # new panels unfold step by step
         yield 0.5
     yield from picture("shown")
+    yield from saved_while_shown(names)
     bpy.ops.ed.undo()
     yield from until(lambda: looks() == before)
     bpy.ops.ed.redo()
@@ -46,6 +48,35 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
         yield from until(lambda: looks() == before)
     preferences.after_align = "nothing"
     print("[clicks] the view was given back every time", flush=True)
+
+
+def saved_while_shown(names: tuple[str, str]) -> Wait:
+    """Save the file with Ctrl S: the window stays as it is, and the file has nothing of it."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
+    SAVED.unlink()
+    there = looks(), {obj.name for obj in bpy.context.selected_objects}, bpy.context.object.name
+    alone = {obj.name for obj in bpy.context.visible_objects}
+    over_the_viewport()
+    pointer("key", "ctrl+s")
+    yield from until(SAVED.exists)
+    yield 1.0
+    assert (looks(), {obj.name for obj in bpy.context.selected_objects}, bpy.context.object.name) == there
+    assert {obj.name for obj in bpy.context.visible_objects} == alone
+    assert not bpy.data.is_dirty
+    with bpy.data.libraries.load(str(SAVED)) as (held, _):
+        assert not [name for name in held.objects if "side by side" in name], held.objects
+        assert set(names) <= set(held.objects)
+
+
+def opened(names: tuple[str, str]) -> Wait:
+    """Open the file that was saved meanwhile: it shows everything, and what was selected."""
+    bpy.ops.wm.open_mainfile(filepath=str(SAVED))
+    yield 1.0
+    assert not is_alone()
+    assert [obj.name for obj in bpy.context.selected_objects] == [names[0]]
+    assert set(names) <= {obj.name for obj in bpy.context.visible_objects}
+    assert bpy.context.space_data.shading.color_type != "VERTEX"
+    SAVED.unlink()
 
 
 def is_alone() -> bool:

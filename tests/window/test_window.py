@@ -26,6 +26,10 @@ PICTURES = {
     ),
     "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
     "pairing": ("point-pairs",),
+    "surroundings": (
+        *("example", "search", "light", "large-scale", "large-scale-german", "narrow-german", "narrow"),
+        *("weight-paint", "sculpt", "two-windows", "in-the-way", "mended", "linked", "large"),
+    ),
 }
 """What each script leaves."""
 

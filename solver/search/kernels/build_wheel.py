@@ -23,7 +23,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = "mobius_kernels"
-SOURCES = ("kernels.c", "sphere.c", "texels.c")
+SOURCES = ("kernels.c", "sphere.c", "boxes.c", "texels.c")
 # without contraction and reassociation every machine computes the same numbers; errno and traps are not looked at
 FLAGS = ["-std=c11", "-O3", "-shared", "-Wall", "-Wextra", "-Werror"]
 FLAGS += ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-s"]

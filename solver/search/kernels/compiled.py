@@ -20,7 +20,7 @@ from ..watch import Halt, look
 from .layout import one_row, own_rows, sector_grid, sectors
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 11
+INTERFACE = 12
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20
@@ -99,6 +99,10 @@ def opened(path: Path) -> ctypes.CDLL:
     loaded.mobius_images.restype = loaded.sphere_images_of.restype = None
     loaded.mobius_images.argtypes = [_I64, _POINTER, _POINTER, _F64, _F64, _F64, _F64, _F64, *[_POINTER] * 4]
     loaded.sphere_images_of.argtypes = [_I64, *[_POINTER] * 8]
+    loaded.boxes_bounds.restype, loaded.boxes_expand.restype = None, _I64
+    loaded.boxes_bounds.argtypes = [_POINTER, _POINTER, _I64, _F64, _POINTER]
+    expansion = [_POINTER, _POINTER, _I64, _I64, _F64, _F64, _I64, _POINTER, _I64, _POINTER, _POINTER, _I64]
+    loaded.boxes_expand.argtypes = expansion
     return loaded
 
 

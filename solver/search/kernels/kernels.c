@@ -36,7 +36,7 @@
 #define CHILDREN 4
 #endif
 
-#define INTERFACE 11
+#define INTERFACE 12
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 from commands import QUICK, listing, run
@@ -53,3 +54,22 @@ def test_a_vertex_group_names_the_piece_that_is_matched(scans: Path, capsys: pyt
     status, _, err = run(capsys, "align", *pair, "--source-cut", "Left", *QUICK)
     assert status == 1
     assert "has no vertex group and no attribute of single numbers named 'Left'" in err
+
+
+def test_marked_seams_say_where_a_mesh_is_cut_open(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scans / "source.blend"))
+    mesh = next(obj for obj in bpy.data.objects if obj.type == "MESH").data
+    middle = {v.index for v in mesh.vertices if abs(v.co.x) < 1e-4}
+    along = [edge for edge in mesh.edges if set(edge.vertices) <= middle]
+    for edge in along:
+        edge.use_seam = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(scans / "sewn.blend"))
+    report_file = scans / "report.json"
+    pair = scans / "sewn.blend", scans / "target.obj"
+    status, _, err = run(capsys, "align", *pair, "--source-cut", "seams", "--report", report_file, *QUICK)
+    assert status == 0
+    assert f"cut open along {len(along)} edges, as asked, to a piece of " in err
+    assert 0.45 < json.loads(report_file.read_text())["cut_to"]["source"] < 0.55
+    status, _, err = run(capsys, "align", *pair, "--target-cut", "seams", *QUICK)
+    assert status == 1
+    assert "has no edge marked as a seam: mark some in Edit Mode (Edge > Mark Seam)" in err

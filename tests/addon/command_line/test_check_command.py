@@ -65,7 +65,7 @@ def test_check_says_before_aligning_what_a_disc_holds_badly(tmp_path: Path, caps
     assert ": disc, " in less
     assert "; long and narrow: less exact, as angles are lost along " in less
     assert "20.obj: cannot be used: it is too long and narrow to be aligned in a disc" in not_at_all
-    assert not_at_all.endswith("cut it into pieces that are at most ten times as long as wide")
+    assert not_at_all.endswith("cut it into pieces that are at most eight times as long as wide")
 
 
 def test_check_prints_every_object_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,7 +42,8 @@ def moved(mesh: TriangleMesh, seed: int) -> TriangleMesh:
     around = np.zeros(len(mesh.vertices), np.intp)
     around[mesh.faces.ravel()[side]] = side // 3
     share = rng.dirichlet(np.ones(3), len(mesh.vertices))
-    share[np.concatenate(topology(mesh).boundary_loops)] = 0
+    for loop in topology(mesh).boundary_loops:  # none where it is closed
+        share[loop] = 0
     corners = mesh.vertices[mesh.faces[around]]
     shift = np.einsum("nk,nkd->nd", share, corners - mesh.vertices[:, None]) / 2
     for _ in range(12):

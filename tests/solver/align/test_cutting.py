@@ -7,10 +7,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import revolved, snowman
+from garments import tube_form, woven
 from scans import bumps, percent, places, posed, remeshed
 
-from solver import AlignSettings, MeshError, TriangleMesh, align, cleaned, correspond, prepare, report
+from solver import (
+    AlignSettings,
+    MeshError,
+    TriangleMesh,
+    align,
+    cleaned,
+    correspond,
+    load_surface,
+    prepare,
+    report,
+    save_surface,
+)
 from solver.align.cutting import MUCH, shrunk
+from solver.align.diagnosis import deep
+from solver.align.judgement import judge
+from solver.align.prepared import Surface
 from solver.flatten.flatten import flatten
 
 SMALL = AlignSettings(samples=60, targets=400, reflect="never")
@@ -78,6 +93,35 @@ def test_a_person_does_not_go_to_one_disc(data_path: Callable[[str], Path]) -> N
     assert shrunk(flatten(tidy.mesh, fill_holes=True)) > 2 * MUCH
 
 
+def person(path: Path) -> tuple[TriangleMesh, np.ndarray]:
+    """The skin of a whole body, and which of its vertices are of the head."""
+    data = np.load(path)
+    corner = data["corner"].reshape(-1, 4)
+    skin = corner[data["part"] == data["part"][0]]
+    faces = np.concatenate([skin[:, [0, 1, 2]], skin[:, [0, 2, 3]]])
+    start, number = data["group_start"], list(data["group_names"]).index("head")
+    rows = slice(start[number], start[number + 1])
+    inside = np.zeros(len(data["vertices"]), bool)
+    inside[data["group_vertex"][rows][data["group_weight"][rows] >= 0.5]] = True
+    return TriangleMesh(data["vertices"], faces, path.stem), inside
+
+
+def test_two_people_are_called_too_deep_and_their_heads_are_aligned(data_path: Callable[[str], Path]) -> None:
+    """What is to be done about two whole bodies works: they share their vertices, which is the truth."""
+    (woman, of_woman), (man, of_man) = (person(data_path(f"heads/mpfb_{who}_body.npz")) for who in ("woman", "man"))
+    for body in (woman, man):
+        cause = deep(Surface(body, fill_holes=True, largest_part=True))
+        assert cause is not None
+        assert cause.text.startswith(f"'{body.name}' is deep, 2")
+        assert cause.text.endswith("of it has hardly any room on a sphere: cut out what is to be matched")
+    pieces = prepare(woman, SMALL, within=of_woman), prepare(posed(man, 4), SMALL, within=of_man)
+    alignment = align(*pieces, SMALL)
+    assert judge(alignment).level != "doubtful"
+    found = correspond(alignment)
+    errors = percent(places(found, woman)[found.matched], woman.vertices[found.matched], alignment.source.mesh)
+    assert errors.mean() < 3
+
+
 def test_a_head_goes_to_one_disc(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:
     assert shrunk(flatten(pair[1])) < 0.1 * MUCH
 
@@ -92,3 +136,59 @@ def test_what_does_not_fit_is_refused(pair: tuple[TriangleMesh, TriangleMesh, np
         align(head, ball, SMALL)
     with pytest.raises(MeshError, match="is closed"):
         align(head, body, replace(SMALL, cut=False))
+
+
+def hose(rows: int, columns: int, angle: float, seed: int) -> tuple[TriangleMesh, np.ndarray, np.ndarray]:
+    """A tube of 44 radii, its parameters, and the edges along it where it is sewn."""
+    mesh, place = woven(tube_form(44, 1.0, seed=2), rows, columns, angle, seed, tube=True)
+    line = np.arange(rows) * columns
+    return mesh, place, np.stack([line[:-1], line[1:]], axis=1)
+
+
+def test_what_no_disc_holds_is_cut_open_along_its_seam() -> None:
+    (source, _, sewn), (target, place, other) = hose(150, 16, 0.0, 1), hose(130, 14, 1.0, 2)
+    with pytest.raises(MeshError, match="'Cloth' is too deep or too long for a disc"):
+        align(source, target, SMALL)
+    alignment = align(prepare(source, SMALL, within=sewn), prepare(posed(target, 3), SMALL, within=other), SMALL)
+    assert "'Cloth': cut open along 149 edges, as asked, for the computation only" in alignment.warnings
+    found = correspond(alignment)
+    assert len(found.face) == len(target.vertices)
+    truth = tube_form(44, 1.0, seed=2)(place[:, 0], place[:, 1], 0.0)
+    # on the seam itself either side may be meant
+    assert percent(places(found, source), truth, source).mean() < 1.0
+    assert found.matched.mean() > 0.95
+
+
+def test_a_closed_surface_is_cut_open_along_its_seams() -> None:
+    body = snowman(seed=3)
+    rim = np.flatnonzero(np.isclose(body.vertices[:, 2], 0.5))
+    turn = rim[np.argsort(np.arctan2(body.vertices[rim, 1], body.vertices[rim, 0]))]
+    cut = prepare(body, SMALL, within=np.stack([turn, np.roll(turn, -1)], axis=1))
+    flipped = TriangleMesh(body.vertices, body.faces[:, [0, 2, 1]], "Body")
+    again = prepare(flipped, SMALL, within=np.stack([turn, np.roll(turn, -1)], axis=1))
+    for surface in (cut, again):
+        kept = np.unique(surface.cleaned.origin[surface.cleaned.mesh.faces])
+        assert len(surface.flattening.boundary) == len(turn)
+        assert body.vertices[kept, 2].max() <= 0.5 + 1e-9  # the body is larger than its head
+        assert "to a piece of" in surface.notes[0]
+        assert surface.notes[0].endswith("the rest has no counterpart, for the computation only")
+    # either way its outside is outside
+    inner = cut.mesh.vertices[cut.mesh.faces[0]], again.mesh.vertices[again.mesh.faces[0]]
+    assert np.sign(np.linalg.det(inner[0])) == np.sign(np.linalg.det(inner[1]))
+
+
+def test_seams_that_are_not_inside_are_refused() -> None:
+    sheet = bumps(300, seed=1)
+    rim = flatten(sheet).boundary
+    with pytest.raises(MeshError, match="'bumps' has none of the edges inside along which it was to be cut open"):
+        prepare(sheet, SMALL, within=np.stack([rim, np.roll(rim, -1)], axis=1))
+
+
+def test_a_cut_surface_is_saved_with_its_seam(tmp_path: Path) -> None:
+    mesh, _, sewn = hose(40, 10, 0.0, 1)
+    one = prepare(mesh, SMALL, within=sewn)
+    save_surface(tmp_path / "one.npz", one)
+    again = load_surface(tmp_path / "one.npz")
+    assert again.within is not None
+    assert np.array_equal(again.within, sewn)
+    assert np.array_equal(again.flattening.places, one.flattening.places, equal_nan=True)

@@ -137,6 +137,16 @@ def test_what_juts_out_too_far_is_refused_with_the_figure():
         flatten_sphere(needle)
 
 
+@pytest.mark.parametrize("name", ["mpfb_woman_body", "mpfb_man_body"])
+def test_a_body_has_no_room_on_a_sphere(name, data_path):
+    with np.load(data_path(f"heads/{name}.npz")) as data:
+        corners = data["corner"].reshape(-1, 4)[data["part"] == data["part"][0]].astype(int)
+        skin = TriangleMesh(data["vertices"], np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]), name)
+    said = r"sphere: 2\d% of it would shrink there by more than a million, parts to 1/10\^2\d of their area: cut off"
+    with pytest.raises(MeshError, match=said):
+        flatten_sphere(skin)
+
+
 def test_turned_triangles_are_put_right_and_others_stay():
     mesh = hull(even_points(1000))
     points = mesh.vertices.copy()

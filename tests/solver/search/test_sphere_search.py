@@ -161,6 +161,18 @@ def test_the_result_does_not_depend_on_threads():
     assert found[0].rotations_certified
 
 
+def test_the_trace_runs_from_nothing_to_the_outcome():
+    source, target, radius, weights = weighted()
+    found = sphere_search(source, target, radius / 2, weights=weights, most_nodes=30_000, threads=1)
+    seconds, nodes, value, bound = np.array([(x.seconds, x.nodes, x.value, x.upper_bound) for x in found.trace]).T
+    assert len(found.trace) >= 4
+    assert (np.diff(seconds) >= 0).all()
+    assert (np.diff(nodes) >= 0).all()
+    assert (np.diff(value) >= 0).all()
+    assert (np.diff(bound) <= 0).all()
+    assert (value[-1], bound[-1], nodes[-1]) == (found.value, found.upper_bound, found.nodes)
+
+
 def test_pose_does_not_matter():
     source, target, radius, weights = weighted(1)
     first = sphere_search(source, target, radius, weights=weights, h_max=0)

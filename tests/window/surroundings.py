@@ -1,0 +1,234 @@
+"""Runs in Blender's window, driven by `gui_shot.sh`: the panel where work is done otherwise than in a fresh window.
+
+Another theme, scale and width, another mode, a second window, a linked mesh, a large one, one that cannot be used, and
+the search for commands. `bpy`, `PACKAGE`, `region`, `click`, `drag` and `shot` are the driver's.
+"""
+
+import importlib
+import time
+from pathlib import Path
+
+import hand
+from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, undo, until
+
+vars(hand).update(region=region, click=click, shot=shot)
+demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
+Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+comparison = importlib.import_module(PACKAGE + ".mobius_addon.comparison")
+
+QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
+SLOWEST = 1.0
+"""Seconds that the window may take to draw itself with 100,000 faces, more than without an extension: it draws by
+software, beside other work."""
+
+
+def steps() -> Wait:
+    """Everything, with the seconds to wait in between."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    yield from example()
+    settings = bpy.context.scene.mobius
+    names = settings.source.name, settings.target.name
+    yield from searched(names)
+    assert bpy.ops.mobius.align("EXEC_DEFAULT", True, **QUICK) == {"FINISHED"}
+    bpy.ops.mobius.heat_map("EXEC_DEFAULT", True, measure="confidence")
+    yield from second_window(names)
+    yield from mended(names)
+    yield from linked(names)
+    yield from modes(names)
+    yield from looks(names)
+    yield from large(names)
+    print("[clicks] done", flush=True)
+
+
+def example() -> Wait:
+    """Load the example by its button, which then stands where Remove Example is."""
+    yield 1.0
+    yield from click_on((yield from find("bpy.ops.mobius.load_example", across=0.75)))
+    yield from until(lambda: bpy.context.scene.mobius.target is not None)
+    yield from picture("example")
+
+
+def searched(names: tuple[str, str]) -> Wait:
+    """Search for "map mobius", as F3 does, and run what is found; a collection may be called Mobius too."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name in names)
+    source, target = (bpy.data.objects[name] for name in names)
+    bpy.context.view_layer.objects.active = source
+    for name, value in QUICK.items():
+        setattr(bpy.context.scene.mobius, name, value)
+    bpy.context.preferences.addons[PACKAGE].preferences.after_align = "nothing"
+    over_the_viewport()
+    yield 0.5
+    bpy.ops.wm.search_menu("INVOKE_DEFAULT")
+    yield 2.0
+    pointer("type", "--delay", "60", "map mobius")
+    yield from picture("search")
+    pointer("key", "Return")
+    yield from until(lambda: Job.current is None and bool(target.data.mobius_transferred))
+    yield 1.0
+
+
+def looks(names: tuple[str, str]) -> Wait:
+    """Blender's light theme, a scale of 1.5, German, and a sidebar as narrow as it can be."""
+    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    bpy.context.window_manager.mobius_view.matches = True
+    preferences = bpy.context.preferences
+    themes = Path(bpy.utils.preset_paths("interface_theme")[0])
+    bpy.ops.script.execute_preset(
+        filepath=str(themes / "Blender_Light.xml"), menu_idname="USERPREF_MT_interface_theme_presets"
+    )
+    yield from picture("light")
+    bpy.ops.preferences.reset_default_theme()
+    preferences.view.ui_scale = 1.5
+    yield 1.0
+    yield from picture("large-scale")
+    preferences.view.language = "de_DE"
+    yield from picture("large-scale-german")
+    preferences.view.ui_scale = 1.0
+    yield 1.0
+    sidebar = region("UI")
+    before = sidebar.width
+    for beside in 3 * (-3, 8, 3, 0, -6):  # where its edge can be gripped differs between versions
+        left, y = sidebar.x + beside, screen_height() - (sidebar.y + sidebar.height - 60)
+        yield drag(left, y, left + 90, y)
+        yield 1.0
+        if region("UI").width != before:
+            break
+    print(f"[clicks] sidebar {before} -> {region('UI').width} pixels wide", flush=True)
+    assert 1 < region("UI").width < before
+    over_the_viewport()
+    yield from picture("narrow-german")
+    preferences.view.language = "en_US"
+    yield from picture("narrow")
+    bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+
+
+def modes(names: tuple[str, str]) -> Wait:
+    """In other modes the buttons say what to do instead of failing."""
+    source = bpy.data.objects[names[0]]
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == source)
+    bpy.context.view_layer.objects.active = source
+    for mode in ("WEIGHT_PAINT", "SCULPT"):
+        bpy.ops.object.mode_set(mode=mode)
+        yield from picture(mode.lower().replace("_", "-"))
+        for operator in (bpy.ops.mobius.align, bpy.ops.mobius.transfer, bpy.ops.mobius.side_by_side):
+            assert not operator.poll(), operator
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert bpy.ops.mobius.align.poll()
+
+
+def second_window(names: tuple[str, str]) -> Wait:
+    """Side by Side in one window leaves the other window's viewport alone, and goes when it is ended in the other."""
+    window = bpy.context.window
+    bpy.ops.wm.window_new_main()
+    other = next(x for x in bpy.context.window_manager.windows if x != window)
+    yield 1.0
+    spaces = [max((a for a in x.screen.areas if a.type == "VIEW_3D"), key=lambda a: a.width) for x in (window, other)]
+    with bpy.context.temp_override(window=window, area=spaces[0]):
+        bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    assert [area.spaces.active.local_view is not None for area in spaces] == [True, False]
+    path = SHOTS / "two-windows.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    path.unlink()
+    assert [area.spaces.active.local_view is not None for area in spaces] == [True, False]
+    yield from picture("two-windows")
+    with bpy.context.temp_override(window=other, area=spaces[1]):
+        bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    assert [area.spaces.active.local_view is not None for area in spaces] == [False, False]
+    assert not comparison.is_shown(bpy.context)
+    with bpy.context.temp_override(window=other):
+        bpy.ops.wm.window_close()
+    yield 1.0
+
+
+def mended(names: tuple[str, str]) -> Wait:
+    """A mesh that cannot be used says why, and a button beside it mends it."""
+    settings = bpy.context.scene.mobius
+    settings.largest_part = False
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=(0, 0, 3))
+    balls = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, location=(3, 0, 3))
+    balls.select_set(True)
+    bpy.context.view_layer.objects.active = balls
+    bpy.ops.object.join()
+    name, before = balls.name, len(balls.data.vertices)
+    settings.target = balls
+    bpy.ops.ed.undo_push(message="two parts")
+    yield from picture("in-the-way")
+    place = yield from find("bpy.ops.mobius.mend")
+    yield from click_on(place)
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) < before)
+    yield from picture("mended")
+    undo()
+    yield from until(lambda: len(bpy.data.objects[name].data.vertices) == before)
+    bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.context.scene.mobius.largest_part = True
+    bpy.context.scene.mobius.target = bpy.data.objects[names[1]]
+    yield 0.5
+
+
+def linked(names: tuple[str, str]) -> Wait:
+    """What comes from a library can be a source, and says so as a target."""
+    path = SHOTS / "library.blend"
+    target = bpy.data.objects[names[1]]
+    bpy.data.libraries.write(str(path), {target})
+    with bpy.data.libraries.load(str(path), link=True) as (held, taken):
+        taken.objects = held.objects
+    there = taken.objects[0]
+    bpy.context.scene.collection.objects.link(there)
+    bpy.context.scene.mobius.target = there
+    yield from picture("linked")
+    assert not bpy.ops.mobius.align.poll() or refused()
+    bpy.context.scene.mobius.target = target
+    bpy.data.libraries.remove(there.library)
+    path.unlink()
+    yield 0.5
+
+
+def refused() -> bool:
+    """Whether Align refuses the chosen pair, and says why."""
+    try:
+        bpy.ops.mobius.align("EXEC_DEFAULT", True, **QUICK)
+    except RuntimeError as error:
+        return "library" in str(error) or "linked" in str(error)
+    return False
+
+
+def large(names: tuple[str, str]) -> Wait:
+    """With 100,000 faces the window is drawn as fast as with none of it chosen, and ESC ends the work."""
+    settings = bpy.context.scene.mobius
+    source, target = (bpy.data.objects[name] for name in names)
+    settings.source = settings.target = None
+    for obj in (source, target):
+        modifier = obj.modifiers.new("Finer", "SUBSURF")
+        modifier.subdivision_type, modifier.levels = "SIMPLE", 2
+        bpy.context.view_layer.objects.active = obj
+        if obj.data.shape_keys is not None:
+            obj.shape_key_clear()
+        bpy.ops.object.modifier_apply(modifier=modifier.name)
+        print(f"[clicks] {obj.name} has {len(obj.data.polygons):,} faces", flush=True)
+    yield 1.0
+    without = drawn()
+    settings.source, settings.target = source, target
+    yield from picture("large", 3.0)
+    spent = drawn()
+    print(f"[clicks] drawing: {without:.2f} s without, {spent:.2f} s with 100,000 faces chosen", flush=True)
+    assert spent < without + SLOWEST
+    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **QUICK)
+    yield from until(lambda: Job.current is not None and Job.current.progress.fraction >= 0.1)
+    start = time.perf_counter()
+    hand.escape()
+    yield from until(lambda: Job.current is None, every=0.02)
+    print(f"[clicks] 100,000 faces: ESC ends it after {time.perf_counter() - start:.2f} s", flush=True)
+
+
+def drawn() -> float:
+    """How long the window takes to draw itself once."""
+    start = time.perf_counter()
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
+    return (time.perf_counter() - start) / 3
