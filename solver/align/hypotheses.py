@@ -13,17 +13,13 @@ from ..bend.bend import Draft, facing
 from ..bend.coarse import coarse
 from ..bend.moments import posed
 from ..bend.pose import FAR, misfit
-from ..mobius import Mobius, SphereMobius
-from ..search.matching import Objective
 from ..search.outcome import SearchResult
-from ..search.rival import Rival, scored
-from ..search.sphere_rival import scored_on_sphere
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from .agreement import descriptor_distance
 from .alignment import Alignment
-from .mobius_map import implied, improved, rival_of, taking, unproved
+from .mobius_map import implied, improved, rival_of, taking, unproved, valued
 
 POSE_NODES = 300
 """Vertices of the target that look for a rigid pose."""
@@ -105,13 +101,8 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
     mobius = implied(there, target.places[used], weights, reflected)
     found = improved(replace(found, mobius=mobius), found.difference)
     return Hypothesis(
-        replace(found, taken=_scored(found.objective, found.mobius)), start, "one that a rigid pose implies"
+        replace(found, taken=valued(found.objective, found.mobius)), start, "one that a rigid pose implies"
     )
-
-
-def _scored(objective: Objective, mobius: Mobius | SphereMobius) -> Rival:
-    """Return a transformation with its Q."""
-    return scored(objective, mobius) if isinstance(mobius, Mobius) else scored_on_sphere(objective, mobius)
 
 
 def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:

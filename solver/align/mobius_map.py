@@ -15,8 +15,8 @@ from ..search.both_sides import search_both
 from ..search.branch_and_bound import SearchResult, search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
-from ..search.rival import LOOKED_AT, Rival, best_rival
-from ..search.sphere_rival import best_sphere_rival
+from ..search.rival import LOOKED_AT, Rival, best_rival, scored
+from ..search.sphere_rival import best_sphere_rival, scored_on_sphere
 from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
 from ..surface.mesh import Floats, Integers, MeshError, Places
@@ -154,6 +154,11 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
     if rival is None:
         raise Cancelled
     return rival
+
+
+def valued(objective: Objective, mobius: Mobius | SphereMobius) -> Rival:
+    """Return a transformation with its Q."""
+    return scored(objective, mobius) if isinstance(mobius, Mobius) else scored_on_sphere(objective, mobius)
 
 
 def taking(found: Alignment, rival: Rival | None, tell: Callable[[float], None]) -> Alignment:

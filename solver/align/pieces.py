@@ -15,7 +15,7 @@ from ..surface.mesh import Booleans, Floats, Integers, MeshError
 from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
 from .confidence import SURE
-from .mobius_map import implied, improved, roughly_aligned
+from .mobius_map import implied, improved, roughly_aligned, valued
 from .overlap import Piece, shared
 from .prepared import Surface
 from .remark import Remark
@@ -121,8 +121,8 @@ def _consistent(inner: Alignment, source: Piece, face: Integers, barycentric: Fl
         return inner
     mobius = implied(expected, disc, np.ones(len(disc)), inner.mobius.reflected)
     said = "ambiguous: the best map of the pieces by themselves sends everything elsewhere"
-    inner = replace(inner, mobius=mobius, remarks=(*inner.remarks, Remark("rival", said)))
-    return improved(inner, inner.difference)
+    inner = improved(replace(inner, mobius=mobius, remarks=(*inner.remarks, Remark("rival", said))), inner.difference)
+    return replace(inner, taken=valued(inner.objective, inner.mobius))
 
 
 def _alike(draft: Draft, inner: Alignment, source_cut: Booleans, target_cut: Booleans) -> Booleans:
