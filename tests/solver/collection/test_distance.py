@@ -34,14 +34,14 @@ def test_a_cap_and_a_flat_disc(alpha: float, turned: bool) -> None:
     source, target = (cap, disc) if turned else (disc, cap)
     flow = EvenFlow(source)
     # by the conformal map, which does not preserve areas
-    found = continuous_procrustes(flow, target, flow.disc.locate(target.disc), mirrored=False)
+    found = continuous_procrustes(flow, target, flow.surface.triangles.locate(target.disc), mirrored=False)
     assert found == pytest.approx(by_symmetry(alpha), rel=0.02)
 
 
 def test_the_flow_evens_areas_out() -> None:
     cap, disc = flatten(spherical_cap(30, 2.0, 0.25)[0]), flatten(planar(rings(30, 0.25, seed=3)))
     flow = EvenFlow(disc)
-    face, weights = flow.disc.locate(cap.disc)
+    face, weights = flow.surface.triangles.locate(cap.disc)
     moved = np.abs(flow.evened(cap.disc, face, weights, cap.mesh.vertex_areas / cap.mesh.area))
     share = cap.mesh.vertex_areas / cap.mesh.area
     for radius in (0.3, 0.5, 0.8):  # of a flat disc, the square of the radius is the share of the area
@@ -53,7 +53,7 @@ def test_the_same_surface_in_another_pose_is_at_no_distance() -> None:
     mesh = bumps(1500, seed=3)
     source, target = flatten(mesh), flatten(posed(mesh, 4))
     flow = EvenFlow(source)
-    located = flow.disc.locate(source.disc)
+    located = flow.surface.triangles.locate(source.disc)
     assert continuous_procrustes(flow, target, located, mirrored=False) < 0.003
     image = flatten(mirrored(mesh))
     assert continuous_procrustes(flow, image, located, mirrored=True) < 0.003
