@@ -133,7 +133,7 @@ def drawn(traces: dict[str, solver.SphereSearchResult], path: Path) -> None:
         axes.step(seconds, unit * value, where="post", color=f"C{number}", label=name)
         axes.step(seconds, unit * bound, where="post", color=f"C{number}", linestyle="dashed")
     axes.set(xscale="log", ylim=(80, 135), xlabel="seconds", ylabel="% of the value found")
-    axes.legend(title="value, and the bound on all (dashed)", loc="lower right")
+    axes.legend(title="value, and the bound on all (dashed)", loc=(0.02, 0.63))
     figure.savefig(path, dpi=110)
 
 
