@@ -149,7 +149,7 @@ def test_damage_anywhere_is_a_sentence_or_another_shape(name: str, whole: dict[s
 @pytest.mark.parametrize("name", [name for name in KINDS if MAY_END_BLENDER.search(name)])
 def test_where_damage_may_end_blender_the_program_says_so(name: str, whole: dict[str, bytes], tmp_path: Path) -> None:
     chance = random.Random(name)
-    for _ in range(3):
+    for _ in range(2):
         damaged(tmp_path, name, with_damage(whole[name], chance), whole)
         done = subprocess.run(
             [sys.executable, str(ROOT), "check", name], cwd=tmp_path, capture_output=True, text=True, timeout=120

@@ -56,7 +56,7 @@ def bent(mesh: TriangleMesh, seed: int, count: int, mirror: bool = False) -> tup
 def test_a_bent_closed_surface_is_found_again(mirror):
     source = ball(1500, seed=4, name="ball")
     target, truth = bent(source, 1, 800, mirror)
-    found = align(source, target, AlignSettings(samples=60, targets=400, reflect="auto"))
+    found = align(source, target, AlignSettings(samples=60, targets=400, reflect="auto", time_limit=3.0))
     assert found.mobius.reflected == mirror
     assert isinstance(found.mobius, SphereMobius)
     carried = correspond(found)
