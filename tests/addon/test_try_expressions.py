@@ -98,7 +98,8 @@ def test_each_key_comes_and_goes_on_both_and_all_is_as_before(pair: tuple[Any, A
         if "FINISHED" in result:
             break
         shown = [values(obj) for obj in pair]
-        assert sum(value > 0 for value in shown[1].values()) <= 1
+        # the reference key's own value, which does nothing, is 1 from Blender 5.2 on
+        assert sum(value > 0 for name, value in shown[1].items() if name != "Basis") <= 1
         assert {name: shown[1][name] for name in KEYS} == {name: shown[0][name] for name in KEYS}
         most = {name: max(value, most.get(name, 0)) for name, value in shown[1].items()}
     assert "FINISHED" in result
