@@ -93,6 +93,11 @@ def why_not_mode(context: bpy.types.Context) -> str | None:
     return None if context.mode in MODES else rpt_("Switch to Object Mode first")
 
 
+def why_not_object_mode(context: bpy.types.Context) -> str | None:
+    """Return why what goes through Edit Mode or shows other objects cannot be done now, or None if it can."""
+    return None if context.mode == "OBJECT" else rpt_("Switch to Object Mode first")
+
+
 def why_not_pair(context: bpy.types.Context, *, writes_source: bool, writes_target: bool = True) -> str | None:
     """Return why the chosen source and target cannot be used together, or None if they can."""
     settings, scene = context.scene.mobius, context.scene

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ..streams import say, say_error
+from ..streams import say
 from .mesh_options import require_outer
+from .output_files import warn
 
 if TYPE_CHECKING:
     from ...solver import Alignment, AlignSettings, Correspondence, TriangleMesh
@@ -42,9 +43,7 @@ def read_pair(options: argparse.Namespace, source: Imported, target: Imported) -
     """Return source and target as arrays, named as on the command line, and say where they look otherwise."""
     from ..mesh_data import read_surface, unseen_warning
 
-    for imported in (source, target):
-        if warning := unseen_warning(imported.obj):
-            say_error(f"mobius: warning: {warning}")
+    warn(filter(None, (unseen_warning(imported.obj) for imported in (source, target))))
     return read_surface(source.obj, options.source), read_surface(target.obj, options.target)
 
 
@@ -73,8 +72,7 @@ def align_pair(
         landmarks=pairs,
         within=(piece_of(files[0].obj, options.source_cut), piece_of(files[1].obj, options.target_cut)),
     )
-    for warning in alignment.warnings:
-        say_error(f"mobius: warning: {warning}")
+    warn(alignment.warnings)
     say(summary(options.source, options.target, alignment, correspondence))
     say(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in alignment.seconds.items()))
     return alignment, _corrected(options, correspondence, (source.mesh, target.mesh), corrections)
@@ -127,8 +125,7 @@ def _landmarks(
     if options.landmarks is None:
         return None
     pairs, warnings = read_landmarks(options.landmarks, files, meshes)
-    for warning in warnings:
-        say_error(f"mobius: warning: {warning}")
+    warn(warnings)
     return pairs
 
 
@@ -142,8 +139,7 @@ def _corrections(
     if options.pairs is None:
         return None
     points, warnings = read_point_pairs(options.pairs, files, meshes)
-    for warning in warnings:
-        say_error(f"mobius: warning: {warning}")
+    warn(warnings)
     return PointPairs.near(*meshes, *points)
 
 
@@ -162,7 +158,7 @@ def _corrected(
     bent = through_pairs(found, *meshes, pairs, follow_all=options.follow_all)
     kind, said = describe([f"pair {k + 1}" for k in range(len(pairs.source_face))], bent)
     if kind == "WARNING":
-        say_error(f"mobius: warning: {said}")
+        warn([said])
     else:
         say(said)
     return bent.correspondence

@@ -5,7 +5,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -16,7 +15,7 @@ from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
 from ..options import repair
 from ..translation import told
-from ..usable import why_not
+from ..usable import why_not, why_not_object_mode
 
 
 class MOBIUS_OT_check(bpy.types.Operator):
@@ -42,10 +41,9 @@ class MOBIUS_OT_check(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow wherever objects can be looked at."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set(rpt_("Switch to Object Mode first"))
-            return False
-        return True
+        if reason := why_not_object_mode(context):
+            cls.poll_message_set(reason)
+        return reason is None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Report one sentence."""

@@ -18,7 +18,7 @@ from ...solver.surface.joining import TOUCHING
 from .. import viewport
 from ..mesh_data import Refusal, foreach, read_surface
 from ..translation import told
-from ..usable import why_not
+from ..usable import why_not, why_not_object_mode
 from .check import outside_largest_part, select_vertices
 
 
@@ -73,10 +73,9 @@ class MOBIUS_OT_mend(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow in Object Mode."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set(rpt_("Switch to Object Mode first"))
-            return False
-        return True
+        if reason := why_not_object_mode(context):
+            cls.poll_message_set(reason)
+        return reason is None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Mend the mesh in Edit Mode and come back; what was selected is so again."""

@@ -21,7 +21,7 @@ from ..results import pattern_color, read_layout, require_room, write_color
 from ..textures.preview import preview_settings, show_preview
 from ..textures.writing import has_pictures
 from ..translation import told
-from ..usable import why_not_aligned
+from ..usable import why_not_aligned, why_not_object_mode
 from .transfer import read_through
 
 GAP = 0.15
@@ -169,13 +169,10 @@ class MOBIUS_OT_end_side_by_side(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Allow where the copies are."""
-        if not is_shown(context):
-            cls.poll_message_set(rpt_("Nothing is shown side by side"))
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set(rpt_("Switch to Object Mode first"))
-            return False
-        return True
+        reason = why_not_object_mode(context) if is_shown(context) else rpt_("Nothing is shown side by side")
+        if reason:
+            cls.poll_message_set(reason)
+        return reason is None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove the copies; what was selected and shown before is so again."""

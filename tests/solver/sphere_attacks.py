@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
-from attacks import libraries
+from attacks import libraries, violations
 from spheres import random_mobius, sphere_points, unit
 
 from solver.mobius import SphereMobius
@@ -144,6 +145,17 @@ def holds(node: np.ndarray, mobius: SphereMobius) -> bool:
         return False
     turned = (angle_in(node, mobius) / TURN - node[FROM]) % 1
     return bool(node[WIDTH] >= 1 or turned <= node[WIDTH] + 1e-12 or turned >= 1 - 1e-12)
+
+
+def seen_through_wider_caps(attack: Callable[..., Counter[str]]) -> int:
+    """How often an attack finds values of wider caps above bounds of narrow ones, as it has to somewhere."""
+    seen = 0
+    for number in range(12):
+        rng = np.random.default_rng(number)
+        problem, planted, h_max = cornered_problem(rng)
+        looser = replace(problem, radii=np.minimum(problem.radii * 1.5 + 0.05, 2))
+        seen += sum(violations(attack(rng, problem, planted, h_max, 60, looser)).values())
+    return seen
 
 
 def attack(
