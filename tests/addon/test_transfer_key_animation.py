@@ -197,8 +197,9 @@ def test_keyframes_say_the_same_at_every_time(
             made.poly_order = 2
             made.coefficients = (0.1, 0.5, -0.01)
         if modifier == "ENVELOPE":
-            point = made.control_points.add(10)
-            point.min, point.max = -0.2, 0.7
+            made.control_points.add(10)
+            made.control_points.foreach_set("min", [-0.2])  # point.min = ... reads beyond the point's memory
+            made.control_points.foreach_set("max", [0.7])
         if modifier == "LIMITS":
             made.use_max_y, made.max_y = True, 0.5
         made.use_influence, made.influence = True, 0.75
