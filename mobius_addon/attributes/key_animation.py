@@ -174,7 +174,10 @@ def _copy_modifier(modifier: Any, new: Any) -> None:
     if modifier.type == "ENVELOPE":
         for point in modifier.control_points:
             new.control_points.add(point.frame)
-        for end in ("min", "max"):  # all at once: to set a point's own reads beyond its memory (4.2 to 5.2), and may crash
+        for end in (
+            "min",
+            "max",
+        ):  # all at once: a point's own setter reads beyond its memory (4.2 to 5.2) and may crash
             ends = [getattr(point, end) for point in modifier.control_points]
             new.control_points.foreach_set(end, ends)
 

@@ -1,34 +1,23 @@
-"""Arcs of rotations about an axis that match a pair on the sphere, for all axes and all h of a cell.
+"""Arcs of rotations about an axis that match a pair on the sphere, for all axes of a cell.
 
-A transformation is f = Rz(phi) S_c T_h: the axis c is the point that R carries to the upper pole e3, S_c a rotation
-that does so, phi the angle about it. For given c and h the pair (m, cap(b, rho)) is matched by an arc of angles, as in
-the disc; here are arcs that hold those of all c in a cell of axes and all h in a cube.
+A rotation is R = Rz(phi) S_c: the axis c is the point that R carries to the upper pole e3, S_c a rotation that does so,
+phi the angle about it. For given c the pair (m, cap(b, rho)) is matched by an arc of angles, as in the disc; here are
+arcs that hold those of all c in a cell of axes.
 
 Notes
 -----
 *Cell.* Axes: a square |x - x0|, |y - y0| <= half on one of the six faces of the cube, c along (x, y, 1), turned there
 by `FACES`. The angle between two such axes has the tangent |cross| / dot, (x, y, 1) x (x + s, y + t, 1) = (-t, s, x t -
 y s), so that for |s|, |t| <= half it is at most atan2(half sqrt(2 + (|x| + |y|)^2), 1 + x^2 + y^2 - half (|x| + |y|)):
-`axis_radius`, alpha. h: a cube of half side `ball`; it lies in a ball of radius r = sqrt(3) ball.
+`axis_radius`, alpha.
 
-*Axes.* M(c, c0) is the rotation that takes c to c0 by the shortest way. For any c, phi is free: the transformations of
-a cell are written Rz(phi) S_{c0} M(c, c0) T_h: the same ones. M turns by at most alpha about an axis that is
-orthogonal to c0, so every point moves by at most alpha; and its azimuth, seen from c0, changes at a rate of at most
-|cot a|, a its distance from c0: the velocity is the cross product with a unit vector orthogonal to c0.
-
-*Centres.* With w = m - h, lambda = (1 - |h|^2) / |w|^2 and W the unit vector along w, the derivative of T_h(m) by h is
--(2 w h^T / |w|^2 + lambda (I - 2 W W^T) + I). It takes a vector orthogonal to h and w to -(lambda + 1) times itself,
-and lambda + 1 = 2 (1 - m.h) / |w|^2 <= 2 / |w|, as (1 - m.h)^2 <= 1 - 2 m.h + |h|^2 = |w|^2. In the plane of h and w,
-where m is, T_h is the disc's (x - z) / (1 - x conj(z)): for x on the
-circle and y its image the derivative along d is -2 i y Im(conj(y) d w'), w' = (1 + conj(z) y) / (1 -
-|z|^2), |w'| = 1 / |x - z|:
-at most 2 |d| / |w| long, too, and tangent to the plane's circle, so orthogonal to the first. Hence
-|dT_h(m)| <= 2 |dh| / |m - h|. Along a way of length r from h0 the distance from m falls by at most r, so that T_h(m)
-moves by at most `shift` = 2 r / (|m - h0| - r). The mean of 1 / |m - h| over the sphere is 1, wherever h is.
-
-*Both.* S_{c0} M T_h(m) is within delta = alpha + shift of v = S_{c0} T_{h0}(m). Where neither pole is that near, its
-azimuth is within asin(sin shift / sin a) + alpha max |cot(a +- delta)| of that of v, and asin(sin delta / sin a):
-the smaller one is taken. Its polar angle lies in a +- delta. Where that is not the case, any azimuth is allowed.
+*Axes.* M(c, c0) is the rotation that takes c to c0 by the shortest way. For any c, phi is free: the rotations of a cell
+are written Rz(phi) S_{c0} M(c, c0): the same ones. M turns by at most alpha about an axis that is orthogonal to c0, so
+every point moves by at most alpha; and its azimuth, seen from c0, changes at a rate of at most |cot a|, a its distance
+from c0: the velocity is the cross product with a unit vector orthogonal to c0. So S_{c0} M(m) is within alpha of v =
+S_{c0}(m). Where neither pole is that near, its azimuth is within alpha max |cot(a +- alpha)| of that of v, and within
+asin(sin alpha / sin a): the smaller one is taken. Its polar angle lies in a +- alpha. Where that is not the case, any
+azimuth is allowed.
 
 *Caps.* With g = (1 - cos a) / 2, which rises with a, circles of polar angle a meet the cap of b (polar angle beta,
 angular radius tol, cos tol = 1 - rho^2 / 2) in an arc of half-angle w, sin^2(w / 2) = (cos(a - beta) - cos tol) / (2
@@ -37,7 +26,7 @@ cos a = cos beta / cos tol, where sin w = sin tol / sin beta, and falls from the
 falls, if the lower alone it grows throughout; if both, the full circle is taken.
 
 *Whole cells.* In a window of width 2 e, phi within e of its middle, Rz(phi) moves a point at polar angle a by at most
-e sin a. So all images of m in the cell and the window are within d = delta + e sin a of v turned by the middle, and the
+e sin a. So all images of m in the cell and the window are within d = alpha + e sin a of v turned by the middle, and the
 pair is matched nowhere there unless the angle between that and b is at most tol + d: unless their dot product is at
 least cos tol cos d - sin tol sin d (`surely_dead` in kernels.c).
 
@@ -47,10 +36,9 @@ triangle c0, c1, c: its area, at most 2 asin(tan(p / 2) tan(q / 2)) for two side
 0.51 p q, for p, q <= 1.1 below 1.05 p q. S_c = M(c, n) up to `FACES`, n the middle of the face, so that the other part
 is a turn by -2 atan2(n.(c0 x c1), 1 + n.c0 + c0.c1 + c1.n), the area of the triangle n, c0, c1.
 
-*Rounding.* All quantities are below 8, |m - h| >= 2^-5 where anything is claimed, and less than 60 operations are done:
-images are off by less than 2^-44 and |m| by less than 2^-52 of 1; g is moved outward by `SLACK` = 2^-42, azimuths by
-2^-40 / sin a. The series of sine and cosine are cut off after terms whose remainder, below delta^10 / 3000000 for delta
-< 1.5, is added.
+*Rounding.* All quantities are below 8, and less than 60 operations are done: images are off by less than 2^-44 and |m|
+by less than 2^-52 of 1; g is moved outward by `SLACK` = 2^-42, azimuths by 2^-40 / sin a. The series of sine and cosine
+are cut off after terms whose remainder, below alpha^10 / 3000000 for alpha < 1.5, is added.
 """
 
 from __future__ import annotations
@@ -63,7 +51,7 @@ from ..mobius import SphereMobius
 from ..surface.mesh import Floats
 from .bounds import SLACK, Arcs
 from .kernels.nodes import HALF, X, Y
-from .kernels.sphere_nodes import BALL, FACE, HX, HZ
+from .kernels.sphere_nodes import FACE
 
 FACES = np.array(
     [
@@ -81,19 +69,12 @@ FACES = np.array(
 _TURNS = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [1, 0, -1, 0], [1, 0, 1, 0], [1, 1, 0, 0], [1, -1, 0, 0]], np.float64)
 """The same as quaternions."""
 
-ROOT_3 = 1.7320508075688774
-
 
 def axis_radius(x: Floats, y: Floats, half: Floats) -> Floats:
     """Return an upper bound of the angle between the middle of a square of axes and any other of them, radians."""
     total = np.abs(x) + np.abs(y)
     angle = np.arctan2(half * np.sqrt(2 + total**2), 1 + x**2 + y**2 - half * total)
     return np.where(half > 0, angle * (1 + 2.0**-40) + 2.0**-50, 0.0)
-
-
-def reach(nodes: Floats) -> Floats:
-    """Return how far points move at most in cells, (C,), where |m - h| = 1."""
-    return axis_radius(nodes[:, X], nodes[:, Y], nodes[:, HALF]) + 2 * ROOT_3 * nodes[:, BALL]
 
 
 def frames(nodes: Floats) -> Floats:
@@ -112,8 +93,7 @@ def transformation(node: Floats, phi: float) -> SphereMobius:
     to_pole = np.array([1 + axis[2], axis[1], -axis[0], 0.0])  # 1 + c.e3 and c x e3
     about = np.array([np.cos(phi / 2), 0.0, 0.0, np.sin(phi / 2)])
     q = _product(about, _product(to_pole / np.linalg.norm(to_pole), _TURNS[int(node[FACE])]))
-    x, y, z = node[HX : HZ + 1].tolist()
-    return SphereMobius((x, y, z), tuple((q / np.linalg.norm(q)).tolist()))
+    return SphereMobius(rotation=tuple((q / np.linalg.norm(q)).tolist()))
 
 
 def _product(p: Floats, q: Floats) -> Floats:
@@ -122,7 +102,7 @@ def _product(p: Floats, q: Floats) -> Floats:
 
 
 def images(source: Floats, nodes: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Enclose the image of every source point, (N1, 3), over cells, (C, 13).
+    """Enclose the image of every source point, (N1, 3), over cells, (C, 9).
 
     Returns
     -------
@@ -131,21 +111,13 @@ def images(source: Floats, nodes: Floats) -> tuple[Floats, Floats, Floats, Float
     near, far : (C, N1) float64
         Bounds of g, in [0, 1].
     """
-    h = nodes[:, HX : HZ + 1]
-    square = (h**2).sum(axis=1)
-    r = nodes[:, BALL, None] * ROOT_3
     tilt = axis_radius(nodes[:, X], nodes[:, Y], nodes[:, HALF])[:, None]
-    w = source - h[:, None]
-    w2 = (w**2).sum(axis=2)
-    u = w * ((1 - square)[:, None] / w2)[:, :, None] - h[:, None]
-    v = np.einsum("cik,cjk->cji", frames(nodes), u)
+    v = np.einsum("ik,cjk->cji", source, frames(nodes)).transpose(0, 2, 1)
     height, sine = v[:, :, 2], np.hypot(v[:, :, 0], v[:, :, 1])
-    shift = np.where(r > 0, 2 * r / np.maximum(np.sqrt(w2) - r, 2.0**-10) * (1 + 2.0**-40), 0)
-    delta = shift + tilt
-    unknown = ~(np.sqrt(square) + r[:, 0] < 1 - 2.0**-5)[:, None] | ~(delta < 1.5)
-    shift, delta = np.where(unknown, 0, shift), np.where(unknown, 0, delta)
-    rest = delta**10 / 3000000
-    c, s = np.cos(delta), np.sin(delta)
+    unknown = ~(tilt < 1.5)
+    tilt = np.where(unknown, 0, tilt)
+    rest = tilt**10 / 3000000
+    c, s = np.cos(tilt), np.sin(tilt)
     low, high = height * c + sine * s, height * c - sine * s
     low_sine, high_sine = sine * c - height * s - rest - SLACK, sine * c + height * s - rest - SLACK
     top, bottom = ~(low_sine > 0), ~(high_sine > 0)
@@ -155,8 +127,7 @@ def images(source: Floats, nodes: Floats) -> tuple[Floats, Floats, Floats, Float
     with np.errstate(divide="ignore", invalid="ignore"):
         plain = np.arcsin(np.minimum((s + rest + SLACK) / sine, 1))
         steep = np.maximum((np.abs(low) + rest + SLACK) / low_sine, (np.abs(high) + rest + SLACK) / high_sine)
-        slanted = np.arcsin(np.minimum((np.sin(shift) + SLACK) / sine, 1)) + tilt * steep * (1 + 2.0**-40)
-        angle = np.minimum(plain, slanted) + 2.0**-39 / sine
+        angle = np.minimum(plain, tilt * steep * (1 + 2.0**-40) + SLACK / sine) + 2.0**-39 / sine
     return np.arctan2(v[:, :, 1], v[:, :, 0]), np.where(seen, angle, 2 * np.pi), near, far
 
 
@@ -197,7 +168,7 @@ def widest_half_angle(near: Floats, far: Floats, cap: Floats) -> Floats:
 
 
 def enclosing_arcs(matching: Any, nodes: Floats) -> Arcs:
-    """Return, for each cell, (C, 13), and each pair, an arc that holds every angle phi that matches it in the cell."""
+    """Return, for each cell, (C, 9), and each pair, an arc that holds every angle phi that matches it in the cell."""
     alpha, delta, near, far = images(matching.source, nodes)
     cap = caps(matching.centres, matching.radii)
     inner, outer = cap[matching.target, :2].T

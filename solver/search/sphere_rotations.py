@@ -37,10 +37,10 @@ class Rotations(Search):
         self.sides = [plain, plain.reflected()] if reflect else [plain]
         self.unlooked = plain.limit
         self.value, self.matches = plain.evaluated(self.best, self.check)
-        self.kernels = [sphere_kernels_for(plain, 0, SMALLEST_CELL, MOST_POINTS, self.halt)]
+        self.kernels = [sphere_kernels_for(plain, SMALLEST_CELL, MOST_POINTS, self.halt)]
         if reflect:
             self.kernels.append(self.kernels[0].reflected())
-        self.frontier = [whole_sphere(problem.limit, 0) for problem in self.sides]
+        self.frontier = [whole_sphere(problem.limit) for problem in self.sides]
         self.unlooked = -np.inf
 
     def _improve(self, side: int, left: Floats) -> None:

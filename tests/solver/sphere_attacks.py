@@ -16,7 +16,7 @@ from solver.mobius import SphereMobius
 from solver.search.branch_and_bound import SMALLEST_CELL
 from solver.search.kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
 from solver.search.kernels.sphere_kernels import CompiledSphereKernels, bound_sphere_cells
-from solver.search.kernels.sphere_nodes import BALL, FACE, HX, HZ, new_sphere_nodes
+from solver.search.kernels.sphere_nodes import FACE, new_sphere_nodes
 from solver.search.sphere_bounds import FACES, enclosing_arcs, frames, transformation
 from solver.search.sphere_certificate import certify_sphere
 from solver.search.sphere_matching import SphereMatching, sphere_matching
@@ -54,10 +54,12 @@ def cornered_points(rng: np.random.Generator, count: int) -> np.ndarray:
     return x
 
 
-def cornered_problem(rng: np.random.Generator, most: int = 8) -> tuple[SphereMatching, SphereMobius, float]:
-    """A matching where everything is at the edge, a transformation that matches much, and h_max."""
+def cornered_problem(
+    rng: np.random.Generator, most: int = 8, *, rotation: bool = False
+) -> tuple[SphereMatching, SphereMobius, float]:
+    """A matching where everything is at the edge, a transformation, or rotation, that matches much, and h_max."""
     n1, n2 = rng.integers(1, most + 1, 2)
-    h_max = float(rng.choice([0.0, 0.05, 0.2, 0.5, 0.9]))
+    h_max = 0.0 if rotation else float(rng.choice([0.0, 0.05, 0.2, 0.5, 0.9]))
     planted = random_mobius(rng, h_max, reflect=False)
     if rng.random() < 0.3 and h_max:
         x, y, z = (np.array(planted.h) * h_max * (1 - 1e-15) / max(np.linalg.norm(planted.h), 1e-9)).tolist()
@@ -88,13 +90,11 @@ def axis_of(mobius: SphereMobius) -> np.ndarray:
 
 
 def cells_around(
-    rng: np.random.Generator, problem: SphereMatching, planted: SphereMobius, h_max: float, count: int
+    rng: np.random.Generator, problem: SphereMatching, planted: SphereMobius, count: int
 ) -> tuple[np.ndarray, list[SphereMobius]]:
-    """Cells, and a transformation in each that may match much; often on an edge or corner of the cell."""
+    """Cells, and a rotation in each that may match much; often on an edge or corner of the cell."""
     nodes = new_sphere_nodes(count)
     nodes[:, HALF] = 2.0 ** -rng.integers(0, 30, count)
-    balls = rng.random(count) < 0.7
-    nodes[:, BALL] = np.where(balls, h_max * 2.0 ** -rng.integers(0, 30, count), 0)
     nodes[:, WIDTH], nodes[:, BOUND] = 1, 2.0**20
     middles = nodes.copy()
     about = np.where((rng.random(count) < 0.5)[:, None], axis_of(planted), cornered_points(rng, count))
@@ -109,16 +109,7 @@ def cells_around(
     inside = np.abs(place - nodes[:, [X, Y]]).max(axis=1) <= nodes[:, HALF]
     keep = inside & (rng.random(count) < 0.5)
     middles[:, [X, Y]] = np.where(keep[:, None], place, nodes[:, [X, Y]] + side * nodes[:, [HALF]])
-    h = np.array(planted.h)
-    cell = 2 * np.maximum(nodes[:, [BALL]], 1e-300)
-    nodes[:, HX : HZ + 1] = np.where(nodes[:, [BALL]] > 0, (np.floor(h / cell) + 0.5) * cell, h)
-    step = rng.uniform(-1, 1, (count, 3))
-    step = np.where(rng.random(step.shape) < 0.3, np.sign(step), step)
-    other = nodes[:, HX : HZ + 1] + step * nodes[:, [BALL]]
-    chosen = np.where((rng.random(count) < 0.5)[:, None], h, other)
-    chosen = np.where((np.linalg.norm(chosen, axis=1) <= h_max)[:, None], chosen, h)
-    middles[:, HX : HZ + 1] = chosen
-    middles[:, [HALF, BALL]] = 0
+    middles[:, HALF] = 0
     angles = bound_sphere_cells(problem, middles)[1]
     row, _, centre, width = enclosing_arcs(problem, middles)
     some = rng.permutation(len(row))[: len(row) // 3]
@@ -137,22 +128,20 @@ def angle_in(node: np.ndarray, mobius: SphereMobius) -> float:
 
 
 def holds(node: np.ndarray, mobius: SphereMobius) -> bool:
-    """Whether a cell and its window hold a transformation."""
+    """Whether a cell and its window hold a rotation."""
     turned = FACES[int(node[FACE])] @ axis_of(mobius)
     if turned[2] <= 0 or np.abs(turned[:2] / turned[2] - node[[X, Y]]).max() > node[HALF] + 1e-14:
-        return False
-    if np.abs(np.array(mobius.h) - node[HX : HZ + 1]).max() > node[BALL] + 1e-15:
         return False
     turned = (angle_in(node, mobius) / TURN - node[FROM]) % 1
     return bool(node[WIDTH] >= 1 or turned <= node[WIDTH] + 1e-12 or turned >= 1 - 1e-12)
 
 
-def seen_through_wider_caps(attack: Callable[..., Counter[str]]) -> int:
+def seen_through_wider_caps(attack: Callable[..., Counter[str]], *, rotation: bool = False) -> int:
     """How often an attack finds values of wider caps above bounds of narrow ones, as it has to somewhere."""
     seen = 0
     for number in range(12):
         rng = np.random.default_rng(number)
-        problem, planted, h_max = cornered_problem(rng)
+        problem, planted, h_max = cornered_problem(rng, rotation=rotation)
         looser = replace(problem, radii=np.minimum(problem.radii * 1.5 + 0.05, 2))
         seen += sum(violations(attack(rng, problem, planted, h_max, 60, looser)).values())
     return seen
@@ -167,7 +156,8 @@ def attack(
     looser: SphereMatching | None = None,
 ) -> Counter[str]:
     """Count cells of one problem, and what of each kind of bound lies below a value in it: WRONG."""
-    nodes, known = cells_around(rng, problem, planted, h_max, count)
+    assert h_max == 0
+    nodes, known = cells_around(rng, problem, planted, count)
     value = np.array([(looser or problem).value(f) for f in known])
     counts: Counter[str] = Counter({"cells": len(nodes), "cells that match": int((value > 0).sum())})
     counts["WRONG swept in numpy"] = int((bound_sphere_cells(problem, nodes)[0] < value).sum())
@@ -178,7 +168,7 @@ def attack(
     windows[:, FROM] = phi - np.clip(place, np.minimum(1e-13, windows[:, WIDTH] / 2), windows[:, WIDTH] - 1e-13)
     for name, library in libraries().items():
         with kernels_of(library):
-            kernels = CompiledSphereKernels(problem, h_max, SMALLEST_CELL)
+            kernels = CompiledSphereKernels(problem, SMALLEST_CELL)
         for raster in (False, True) if kernels.rasters else (False,):
             how = f"{name}, {kernels.rasters + ' raster' if raster else 'pairs'}"
             counts[f"WRONG {how}"] += int((kernels.bounds(nodes, raster)[:, BOUND] < value).sum())
@@ -195,7 +185,7 @@ def attack(
 def cells_of(number: int, count: int) -> Counter[str]:
     """Attack some cells of one problem."""
     rng = np.random.default_rng([number, 31])
-    return attack(rng, *cornered_problem(rng), count)
+    return attack(rng, *cornered_problem(rng, rotation=True), count)
 
 
 def searched(number: int, time_limit: float | None = 0.2) -> Counter[str]:

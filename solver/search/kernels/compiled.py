@@ -20,7 +20,7 @@ from ..watch import Halt, look
 from .layout import one_row, own_rows, sector_grid, sectors
 from .nodes import BOUND, new_nodes
 
-INTERFACE = 12
+INTERFACE = 13
 """Of kernels.c: a library that says another number is not used."""
 
 ARENA = 1 << 20

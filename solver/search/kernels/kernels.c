@@ -29,14 +29,13 @@
 
 #ifdef SPHERE
 #define NAME(function) sphere_##function
-#define CHILDREN 8 /* of a cell */
 #define NARROW 0.125 /* turns; windows that are not are looked at stretch by stretch */
 #else
 #define NAME(function) mobius_##function
-#define CHILDREN 4
 #endif
 
-#define INTERFACE 12
+#define INTERFACE 13
+#define CHILDREN 4 /* of a cell */
 #define BINS 512      /* stretches of a window, weights all 1 */
 #define WORDS (BINS / 64)
 #define HEAVY_BINS 256 /* the same, weights differ */
@@ -103,7 +102,7 @@ typedef struct {
     double z_max, smallest;
     const volatile int32_t *halt; /* not 0: come back at once, the search is over */
 #ifdef SPHERE
-    const double *mz;       /* the third coordinate of the source; z_max bounds |h| */
+    const double *mz;       /* the third coordinate of the source; z_max is not used */
     const double *caps;     /* (N2, 5), in the order of `discs`: centre, cos and sin of the radius */
 #endif
 } Problem;
@@ -114,8 +113,7 @@ typedef struct {
     double from, width;     /* window of rotations in turns; width 1: all */
     double bound;           /* no (z, theta) here is worth more */
 #ifdef SPHERE
-    double hx, hy, hz, ball; /* x, y, half: the cell of axes, on a face of the cube; this one that of h */
-    double face;
+    double face;            /* of the cube, that x, y and half are a cell of axes on */
 #endif
 } Node;
 
@@ -258,11 +256,7 @@ static double axis_radius(double x, double y, double half) {
     return argument(across, along) * TURN * (1 + 0x1p-40) + 0x1p-50;
 }
 
-/* ../sphere_bounds.py: shift. How far points move at most, beside what axes move, where |m - h| = 1. */
-static double reach_of(const Node *node) {
-    double r = node->ball * 0x1.bb67ae8584cabp+0; /* sqrt(3) rounded up */
-    return axis_radius(node->x, node->y, node->half) + 2 * r;
-}
+static double reach_of(const Node *node) { return axis_radius(node->x, node->y, node->half); }
 
 /* ../sphere_bounds.py: frames. */
 static void frame_of(const Node *node, double frame[9]) {
@@ -279,35 +273,28 @@ static void frame_of(const Node *node, double frame[9]) {
 static void sphere_images(int64_t n, const double *restrict mx, const double *restrict my, const double *restrict mz,
                           const Node *node, double *restrict alpha, double *restrict delta, double *restrict near,
                           double *restrict far) {
-    double hx = node->hx, hy = node->hy, hz = node->hz, r = node->ball * 0x1.bb67ae8584cabp+0;
-    double h2 = hx * hx + hy * hy + hz * hz, inside = 1 - h2;
     double tilt = axis_radius(node->x, node->y, node->half);
+    int any = !(tilt < 1.5);
+    tilt = any ? 0 : tilt;
+    double q = tilt * tilt, rest = q * q * q * q * q / 3000000;
+    double c = 1 - q * (0.5 - q * (1.0 / 24 - q * (1.0 / 720 - q * (1.0 / 40320))));
+    double s = tilt * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040 - q * (1.0 / 362880)))));
     double frame[9];
     frame_of(node, frame);
-    int outside = !(__builtin_sqrt(h2) + r < 1 - 0x1p-5); /* of what the formulas hold for */
     for (int64_t j = 0; j < n; j++) {
-        double wx = mx[j] - hx, wy = my[j] - hy, wz = mz[j] - hz, w2 = wx * wx + wy * wy + wz * wz;
-        double away = __builtin_sqrt(w2), scale = inside / w2;
-        double ux = wx * scale - hx, uy = wy * scale - hy, uz = wz * scale - hz;
-        double vx = frame[0] * ux + frame[1] * uy + frame[2] * uz, vy = frame[3] * ux + frame[4] * uy + frame[5] * uz;
-        double vz = frame[6] * ux + frame[7] * uy + frame[8] * uz;
+        double x = mx[j], y = my[j], z = mz[j];
+        double vx = frame[0] * x + frame[1] * y + frame[2] * z, vy = frame[3] * x + frame[4] * y + frame[5] * z;
+        double vz = frame[6] * x + frame[7] * y + frame[8] * z;
         double sine = __builtin_sqrt(vx * vx + vy * vy);
-        double d = r > 0 ? 2 * r / most(away - r, 0x1p-10) * (1 + 0x1p-40) : 0, all = d + tilt;
-        int any = outside | !(all < 1.5);
-        d = any ? 0 : d; all = any ? 0 : all;
-        double q = all * all, rest = q * q * q * q * q / 3000000;
-        double c = 1 - q * (0.5 - q * (1.0 / 24 - q * (1.0 / 720 - q * (1.0 / 40320))));
-        double s = all * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040 - q * (1.0 / 362880)))));
-        double low = vz * c + sine * s, high = vz * c - sine * s; /* cosines of the polar angle less and plus all */
+        double low = vz * c + sine * s, high = vz * c - sine * s; /* cosines of the polar angle less and plus tilt */
         double low_sine = sine * c - vz * s - rest - SLACK, high_sine = sine * c + vz * s - rest - SLACK;
         int top = !(low_sine > 0), bottom = !(high_sine > 0); /* a pole is in reach */
         near[j] = (any | top) ? 0 : most(0.5 * (1 - low - rest) - SLACK, 0);
         far[j] = (any | bottom) ? 1 : least(0.5 * (1 - high + rest) + SLACK, 1);
-        double e = d * d, sd = d * (1 - e * (1.0 / 6 - e * (1.0 / 120))) + SLACK;
         double plain = (s + rest + SLACK) / sine;
         double steep = most((positive(low) + rest + SLACK) / low_sine, (positive(high) + rest + SLACK) / high_sine);
         double sure = (top | bottom) ? 1 : 1 / sine;
-        double slanted = arcsine(least(sd * sure, 1)) + ((top | bottom) ? 1 : tilt * steep * (1 + 0x1p-40) * PER_RADIAN);
+        double slanted = (top | bottom) ? 1 : tilt * steep * (1 + 0x1p-40) * PER_RADIAN + SLACK * sure;
         double angle = least(plain < 1 ? arcsine(plain) : 1, slanted) + 4 * SLACK * sure;
         alpha[j] = argument(vy, vx);
         delta[j] = (any | top | bottom | !(angle < 0.5)) ? 1 : angle;
@@ -964,21 +951,16 @@ static int surely_dead(const Problem *p, const Query *q, double from, double wid
         turned[3 + k] = sine * frame[k] + cosine * frame[3 + k];
         turned[6 + k] = frame[6 + k];
     }
-    double hx = node->hx, hy = node->hy, hz = node->hz, h2 = hx * hx + hy * hy + hz * hz;
-    double r = node->ball * 0x1.bb67ae8584cabp+0, tilt = axis_radius(node->x, node->y, node->half);
-    double spin = width * (TURN / 2) * (1 + 0x1p-40);
-    if (!(__builtin_sqrt(h2) + r < 1 - 0x1p-5)) return 0;
+    double tilt = axis_radius(node->x, node->y, node->half), spin = width * (TURN / 2) * (1 + 0x1p-40);
     int64_t total = 0, last = -1;
     for (int64_t i = 0; i < q->entries; i++) /* lists are sorted by weight */
         if (q->parents[i].point != last) { total += p->weight[q->parents[i].pair]; last = q->parents[i].point; }
     for (int64_t i = 0; i < q->entries && (double)total > q->value;) {
         uint32_t j = q->parents[i].point;
-        double wx = p->mx[j] - hx, wy = p->my[j] - hy, wz = p->mz[j] - hz, w2 = wx * wx + wy * wy + wz * wz;
-        double scale = (1 - h2) / w2, ux = wx * scale - hx, uy = wy * scale - hy, uz = wz * scale - hz;
-        double vx = turned[0] * ux + turned[1] * uy + turned[2] * uz, vy = turned[3] * ux + turned[4] * uy + turned[5] * uz;
-        double vz = turned[6] * ux + turned[7] * uy + turned[8] * uz;
-        double d = (r > 0 ? 2 * r / most(__builtin_sqrt(w2) - r, 0x1p-10) * (1 + 0x1p-40) : 0) + tilt;
-        d += spin * (__builtin_sqrt(vx * vx + vy * vy) + 0x1p-40);
+        double x = p->mx[j], y = p->my[j], z = p->mz[j];
+        double vx = turned[0] * x + turned[1] * y + turned[2] * z, vy = turned[3] * x + turned[4] * y + turned[5] * z;
+        double vz = turned[6] * x + turned[7] * y + turned[8] * z;
+        double d = tilt + spin * (__builtin_sqrt(vx * vx + vy * vy) + 0x1p-40);
         uint32_t heaviest = p->weight[q->parents[i].pair], found = 0;
         if (!(d < 1)) { while (i < q->entries && q->parents[i].point == j) i++; continue; }
         double e = d * d, c = 1 - e * (0.5 - e * (1.0 / 24 - e / 720)); /* below cos d */
@@ -1149,7 +1131,7 @@ EXPORT void NAME(rotations)(const Problem *p, const double *x, const double *y, 
             int depth = 1, raster = p->raster || p->own;
 #ifdef SPHERE
             open[0] = (Open){cells[i], 0, -1, 0};
-            open[0].node.half = open[0].node.ball = 0;
+            open[0].node.half = 0;
             open[0].node.from = from[i]; open[0].node.width = width[i]; open[0].node.bound = 0x1p40;
 #else
             open[0] = (Open){{x[i], y[i], 0, 0, 0, from[i], width[i], 0x1p40}, 0, -1, 0};
@@ -1192,51 +1174,31 @@ EXPORT void NAME(rotations)(const Problem *p, const double *x, const double *y, 
     }
 }
 
-#ifdef SPHERE
-/* ../sphere_bounds.py: children. Whether child q is one that may hold a transformation; its window is moved and widened. */
-static int child_of(const Problem *p, const Node *node, int q, Node *child) {
-    *child = *node;
-    double tilt = axis_radius(node->x, node->y, node->half);
-    if (tilt < 2 * node->ball * 0x1.bb67ae8584cabp+0) {
-        double b = node->ball / 2, o2 = 0;
-        double *h[3] = {&child->hx, &child->hy, &child->hz};
-        for (int i = 0; i < 3; i++) {
-            *h[i] += q >> i & 1 ? b : -b;
-            double o = most(positive(*h[i]) - b, 0);
-            o2 += o * o;
-        }
-        child->ball = b;
-        return o2 <= p->z_max * p->z_max * (1 + 0x1p-50);
-    }
-    if (q >= 4) return 0;
-    double half = node->half / 2;
-    child->half = half;
-    child->x += q & 1 ? half : -half; child->y += q & 2 ? half : -half;
-    if (child->width < 1) {
-        double l0 = __builtin_sqrt(1 + node->x * node->x + node->y * node->y);
-        double l1 = __builtin_sqrt(1 + child->x * child->x + child->y * child->y);
-        double det = node->x * child->y - node->y * child->x, dot = 1 + node->x * child->x + node->y * child->y;
-        double small = axis_radius(child->x, child->y, half), most_of = tilt < 0.25 ? 0.51 : 1.05;
-        double wide = most_of * tilt * small * PER_RADIAN + 0x1p-40;
-        child->from -= 2 * argument(det, l0 * l1 + l0 + l1 + dot) + wide;
-        child->width += 2 * wide;
-        if (child->width > FULL) { child->from = 0; child->width = 1; }
-    }
-    return 1;
-}
-#else
-/* Whether child q of a cell is one that may hold a transformation; its window is moved. */
+/* Whether child q of a cell is one that may hold a transformation; its window is moved, on the sphere widened too. */
 static int child_of(const Problem *p, const Node *node, int q, Node *child) {
     static const double side[4][2] = {{-1, -1}, {1, -1}, {-1, 1}, {1, 1}};
     double half = node->half / 2, sx = side[q][0] * half, sy = side[q][1] * half;
     *child = *node;
     child->half = half; child->x += sx; child->y += sy;
+#ifdef SPHERE
+    (void)p;
+    if (child->width < 1) { /* ../sphere_bounds.py: windows */
+        double l0 = __builtin_sqrt(1 + node->x * node->x + node->y * node->y);
+        double l1 = __builtin_sqrt(1 + child->x * child->x + child->y * child->y);
+        double det = node->x * child->y - node->y * child->x, dot = 1 + node->x * child->x + node->y * child->y;
+        double tilt = axis_radius(node->x, node->y, node->half), small = axis_radius(child->x, child->y, half);
+        double wide = (tilt < 0.25 ? 0.51 : 1.05) * tilt * small * PER_RADIAN + 0x1p-40;
+        child->from -= 2 * argument(det, l0 * l1 + l0 + l1 + dot) + wide;
+        child->width += 2 * wide;
+        if (child->width > FULL) { child->from = 0; child->width = 1; }
+    }
+#else
     double ox = most(positive(child->x) - half, 0), oy = most(positive(child->y) - half, 0);
     if (ox * ox + oy * oy > p->z_max * p->z_max * (1 + 0x1p-50)) return 0;
     if (child->width < 1) child->from -= (child->kx * sy + child->ky * sx) * PER_RADIAN;
+#endif
     return 1;
 }
-#endif
 
 /* Search the subtrees of `nodes` depth first for cells whose bound exceeds `value`, at most `budget` bounds each; what is
    left open goes to `left`. Returns how many of `nodes` were taken on (all, unless `left` might overflow, or halted).

@@ -9,12 +9,12 @@ import numpy as np
 
 from ...surface.mesh import Floats, Integers
 from ..matching import Matching
-from ..sphere_bounds import ROOT_3, axis_radius, caps, enclosing_arcs
+from ..sphere_bounds import caps, enclosing_arcs
 from ..watch import Halt, Halted, look
 from .compiled import _POINTER, CompiledKernels, _Problem, library
 from .nodes import BOUND, FROM, HALF, WIDTH, X, Y
 from .reference import cuts, stabbed
-from .sphere_nodes import BALL, HX, HZ, new_sphere_nodes
+from .sphere_nodes import new_sphere_nodes
 
 
 class _SphereProblem(_Problem):
@@ -26,6 +26,9 @@ class CompiledSphereKernels(CompiledKernels):
 
     prefix = "sphere"
     structure = _SphereProblem
+
+    def __init__(self, problem: Matching, smallest: float, halt: Halt | None = None) -> None:
+        super().__init__(problem, 0.0, smallest, halt)
 
     def _source(self, problem: Any) -> dict[str, np.ndarray | None]:
         return dict(zip(("mx", "my", "mz"), problem.source.T, strict=True))
@@ -54,7 +57,7 @@ class CompiledSphereKernels(CompiledKernels):
 
 
 def bound_sphere_cells(problem: Matching, nodes: Floats, check: Any = lambda: None) -> tuple[Floats, Floats]:
-    """Return, for each cell, (C, 13), what Q does not exceed in it, whatever the angle, and a good angle, radians."""
+    """Return, for each cell, (C, 9), what Q does not exceed in it, whatever the angle, and a good angle, radians."""
     bounds, angles = np.zeros(len(nodes)), np.zeros(len(nodes))
     for some in cuts(problem, len(nodes)):
         arcs = partial(enclosing_arcs, nodes=nodes[some])
@@ -67,22 +70,22 @@ class SphereReferenceKernels:
 
     name = "numpy"
 
-    def __init__(self, problem: Matching, h_max: float, smallest: float, halt: Halt | None = None) -> None:
-        self.problem, self.h_max, self.smallest = problem, h_max, smallest
+    def __init__(self, problem: Matching, smallest: float, halt: Halt | None = None) -> None:
+        self.problem, self.smallest = problem, smallest
         self.halt = np.zeros(1, np.int32) if halt is None else halt
 
     def reflected(self) -> SphereReferenceKernels:
         """Return the kernels for the conjugated source."""
-        return SphereReferenceKernels(self.problem.reflected(), self.h_max, self.smallest, self.halt)
+        return SphereReferenceKernels(self.problem.reflected(), self.smallest, self.halt)
 
     def _check(self) -> None:
         look(self.halt)
 
     def rotations(self, z: Floats, value: float = -1.0, windows: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return what the best angle is worth at the middle of each cell, (C, 13), and that angle; 0 if halted."""
+        """Return what the best angle is worth at the middle of each cell, (C, 9), and that angle; 0 if halted."""
         del value, windows
         middles = z.copy()
-        middles[:, [HALF, BALL]] = 0
+        middles[:, HALF] = 0
         try:
             return bound_sphere_cells(self.problem, middles, self._check)
         except Halted:
@@ -94,7 +97,7 @@ class SphereReferenceKernels:
         If halted, cells are left as they were.
         """
         del budget
-        new = children(nodes, self.h_max)
+        new = children(nodes)
         try:
             bounds = np.minimum(bound_sphere_cells(self.problem, new, self._check)[0], new[:, BOUND])
         except Halted:
@@ -103,30 +106,18 @@ class SphereReferenceKernels:
         return new[bounds > value], len(new)
 
 
-def children(nodes: Floats, h_max: float) -> Floats:
-    """Return the cells that cells are split into, with all rotations and their bounds: by axis, or by h.
-
-    The side is cut along which points move more.
-    """
-    tilt = axis_radius(nodes[:, X], nodes[:, Y], nodes[:, HALF])
-    by_h = tilt < 2 * ROOT_3 * nodes[:, BALL]
-    signs = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * 2.0 - 1
-    axes = np.repeat(nodes[~by_h], 4, axis=0)
-    axes[:, HALF] /= 2
-    axes[:, [X, Y]] += axes[:, [HALF]] * np.tile(signs[:4, :2], (int((~by_h).sum()), 1))
-    balls = np.repeat(nodes[by_h], 8, axis=0)
-    balls[:, BALL] /= 2
-    balls[:, HX : HZ + 1] += balls[:, [BALL]] * np.tile(signs, (int(by_h.sum()), 1))
-    nearest = np.maximum(np.abs(balls[:, HX : HZ + 1]) - balls[:, [BALL]], 0)
-    balls = balls[(nearest**2).sum(axis=1) <= h_max**2 * (1 + 2.0**-50)]
-    new = np.concatenate([axes, balls])
+def children(nodes: Floats) -> Floats:
+    """Return the four cells that each cell is split into, with all rotations and their bounds."""
+    new = np.repeat(nodes, 4, axis=0)
+    new[:, HALF] /= 2
+    new[:, [X, Y]] += new[:, [HALF]] * np.tile([[-1.0, -1], [1, -1], [-1, 1], [1, 1]], (len(nodes), 1))
     new[:, FROM], new[:, WIDTH] = 0, 1
     return new
 
 
 def sphere_kernels_for(
-    problem: Matching, h_max: float, smallest: float, most_points: int, halt: Halt | None = None
+    problem: Matching, smallest: float, most_points: int, halt: Halt | None = None
 ) -> CompiledSphereKernels | SphereReferenceKernels:
     """Return the fastest kernels there are for a matching; see `kernels_for`."""
     compiled = len(problem.source) < most_points and library() is not None
-    return (CompiledSphereKernels if compiled else SphereReferenceKernels)(problem, h_max, smallest, halt)
+    return (CompiledSphereKernels if compiled else SphereReferenceKernels)(problem, smallest, halt)

@@ -7,17 +7,17 @@ import numpy as np
 from ...surface.mesh import Floats
 from .nodes import BOUND, HALF, WIDTH
 
-HX, HY, HZ, BALL, FACE = range(8, 13)
-"""Columns: centre and half side of a cube of h, and the face of the cube that X, Y and HALF are a square of axes on."""
+FACE = 8
+"""Column: the face of the cube that X, Y and HALF are a square of axes on."""
 
 
 def new_sphere_nodes(count: int) -> Floats:
-    """Return rows of zeros, (count, 13)."""
-    return np.zeros((count, 13))
+    """Return rows of zeros, (count, 9)."""
+    return np.zeros((count, FACE + 1))
 
 
-def whole_sphere(bound: float, h_max: float) -> Floats:
-    """Return the six rows that hold every transformation with |h| <= h_max: the faces, all rotations about an axis."""
+def whole_sphere(bound: float) -> Floats:
+    """Return the six rows that hold every rotation: the faces, all rotations about an axis."""
     nodes = new_sphere_nodes(6)
-    nodes[:, HALF], nodes[:, WIDTH], nodes[:, BOUND], nodes[:, BALL], nodes[:, FACE] = 1, 1, bound, h_max, range(6)
+    nodes[:, HALF], nodes[:, WIDTH], nodes[:, BOUND], nodes[:, FACE] = 1, 1, bound, range(6)
     return nodes
