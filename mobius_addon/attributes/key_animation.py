@@ -174,10 +174,8 @@ def _copy_modifier(modifier: Any, new: Any) -> None:
     if modifier.type == "ENVELOPE":
         for point in modifier.control_points:
             new.control_points.add(point.frame)
-        for end in (
-            "min",
-            "max",
-        ):  # all at once: a point's own setter reads beyond its memory (4.2 to 5.2) and may crash
+        # all at once: the setter of a single point reads beyond its memory (4.2 to 5.2), and may crash
+        for end in ("min", "max"):
             ends = [getattr(point, end) for point in modifier.control_points]
             new.control_points.foreach_set(end, ends)
 
