@@ -42,7 +42,8 @@ def folder(tmp_path: Path) -> Path:
         obj.data.materials.append(bpy.data.materials.new(obj.name))
         obj.shape_key_add(name="Basis")
     up = np.array(both["eye"].matrix_world.to_3x3().inverted()) @ [0, 0, 0.1]
-    for obj, step, names in ((both["skin"], [0, 0, 0.1], ("Up",)), (both["eye"], up, ("Up", "Blink"))):
+    bent = np.outer(np.sin(3 * positions(both["skin"])[:, 0]), [0, 0, 0.1])
+    for obj, step, names in ((both["skin"], bent, ("Up",)), (both["eye"], up, ("Up", "Blink"))):
         for key in names:
             places = positions(obj) + step
             obj.shape_key_add(name=key).points.foreach_set("co", places.astype(np.float32).ravel())
@@ -91,11 +92,16 @@ def test_every_object_gets_what_its_counterpart_has(
         keys = obj.data.shape_keys.key_blocks
         assert [key.name for key in keys][1:] == names
         bpy.context.view_layer.update()
+        rest = np.array([x.co[:] for x in keys[0].points])
         for name in names:
-            rest = np.array([x.co[:] for x in keys[0].points])
             moved = np.array([x.co[:] for x in keys[name].points]) - rest
             world = moved @ np.array(obj.matrix_world.to_3x3()).T
-            assert np.allclose(world, [0, 0, 0.1], atol=0.02)
+            height = 0.1 * np.sin(3 * rest[:, 0]) if obj == skin else np.full(len(rest), 0.1)
+            assert np.allclose(world, height[:, None] * [0, 0, 1], atol=0.02)
+            # a .glb of flat faces has a vertex for each corner
+            _, first, place = np.unique(rest.round(5), axis=0, return_index=True, return_inverse=True)
+            assert (len(first) < len(rest)) == (ending == ".glb")
+            assert np.allclose(moved, moved[first][place.ravel()], atol=1e-5)
 
 
 def test_two_of_the_same_are_no_one_thing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
