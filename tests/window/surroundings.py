@@ -62,7 +62,7 @@ def searched(names: tuple[str, str]) -> Wait:
     bpy.ops.wm.search_menu("INVOKE_DEFAULT")
     yield 2.0
     pointer("type", "--delay", "60", "map mobius")
-    yield from picture("search")
+    yield from picture("search", 3.0)
     pointer("key", "Return")
     yield from until(lambda: Job.current is None and bool(target.data.mobius_transferred))
     yield 1.0
