@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
-from ...solver import Correspondence
+from ...solver import Correspondence, TriangleMesh
 from ...solver.carry.contacts import brought_together
 from ...solver.carry.corners import CornerInterpolation
 from ...solver.carry.elements import edges_in_reach, source_of_corners, source_of_edges, source_of_faces
@@ -18,6 +18,7 @@ from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.carry.frames import local_similarities
 from ...solver.carry.gradients import GradientTransfer
 from ...solver.carry.parts import drawn_apart, without_riders
+from ...solver.surface.joining import first_of_place
 from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
 
@@ -156,7 +157,7 @@ class Carrier:
             carried = self._gradients(values)
             if self.contacts:
                 carried = brought_together(self._gradients, carried, self._gradients.moved_places(values))
-            return self.filled(carried)
+            return self.filled(carried[self._first])
         rotation, scale = self._similarities
         carried = self._matrix @ values
         return self.filled(np.einsum("nij,nj->ni", rotation, carried) * scale[:, None])
@@ -259,8 +260,24 @@ class Carrier:
         return local_similarities(self.correspondence, self.source.rest, self.target.rest)
 
     @cached_property
+    def _first(self) -> Integers:
+        """The first of the target's vertices, (n,), that each one is one with where a file has cut the surface open.
+
+        Not where shape keys open it, on the target or on the source through the map.
+        """
+        own = [x for x in (self.target.keys, self.source.keys) if x is not None]
+        if self.source.keys is not None:
+            own[-1] = self._matrix @ self.source.keys
+        return first_of_place(self.target.rest, np.concatenate(own, axis=1) if own else None)
+
+    @cached_property
     def _gradients(self) -> GradientTransfer:
-        return GradientTransfer.of(self.correspondence, self.source.rest, self.target.rest)
+        found, rest, first = self.correspondence, self.target.rest, self._first
+        if (first != np.arange(len(first))).any():
+            rest = TriangleMesh(rest.vertices, first[rest.faces], rest.name)
+            if found.leader is not None:
+                found = replace(found, leader=np.where(found.leader >= 0, first[found.leader], -1))
+        return GradientTransfer.of(found, self.source.rest, rest)
 
     @cached_property
     def _polygon_of_triangle(self) -> Integers:

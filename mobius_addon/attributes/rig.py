@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -184,6 +185,17 @@ def write_rig(obj: bpy.types.Object, rig: Rig) -> None:
             obj.modifiers.remove(modifier)
         bpy.data.armatures.remove(copy.data)  # with the object
         raise
+
+
+def share_rig(obj: bpy.types.Object, others: Sequence[bpy.types.Object], rig: Rig) -> None:
+    """Let the armature that `write_rig` has given an object move others too, which belong to it and have none."""
+    source = next((x for x in bpy.data.objects if x.session_uid == rig.uid), None)
+    armature, copy = (armature_of(x) if x is not None else None for x in (source, obj))
+    if source is None or armature is None or copy is None:
+        return
+    for other in others:
+        if armature_of(other) is None:
+            _attach(other, source, armature, copy, dict(rig.names))
 
 
 def _make(

@@ -34,8 +34,10 @@ def opened_pair(options: argparse.Namespace, *, write: bool) -> Iterator[tuple[I
 
     if _same_mesh(options.source, options.target):
         raise Refusal(f"'{options.source}' is both source and target: give two meshes")
-    with opened(options.target, options.source, write=write) as found:
+    with opened(options.target, options.source, write=write, whole=True) as found:
         assert found.source is not None
+        warn(found.notes)
+        found.notes.clear()
         yield found.source, found.target, found.notes
 
 

@@ -23,6 +23,7 @@ from .transfer_options import add_texture_options, add_transfer_options, transfe
 
 if TYPE_CHECKING:
     from ..attributes import Transfer, TransferSettings
+    from ..files import Imported
 
 HELP = (
     "Carry what is on the source over to the target, or to each of several. With several, -o, --map and --report "
@@ -80,8 +81,9 @@ def _transfer_to(options: argparse.Namespace) -> None:
 
     from ...solver import report, save_map
     from ..attributes.reading import NothingThere
+    from ..attributes.shares import write_shares
     from ..demo.pictures import require_cycles
-    from ..files import Unreadable, outputs, write_mesh
+    from ..files import Unreadable, outputs, require_room, write_mesh
     from ..files.pictures_beside import write_map, write_pictures
     from ..last_transfer import describe_counts
     from ..operators.transfer import read_through
@@ -104,6 +106,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
         return
     with outputs() as written:
         with opened_pair(options, write=True) as (source, target, notes):
+            _require_single(choices, source, target)
+            require_room(len(target.objects), options.output)
             surfaces = read_pair(options, source, target)
             data = read_data(options, surfaces[0])
             alignment, correspondence = matched_pair(options, (source, target), surfaces, settings)
@@ -119,7 +123,10 @@ def _transfer_to(options: argparse.Namespace) -> None:
                     raise
                 plan = plan_of_data(unmatched)
             write_data(data, carrier, options, target, written)
-            plan.write(target.obj)
+            if target.members:
+                write_shares(plan, target.members, source.members, correspondence)
+            if options.sheet or not target.members:
+                plan.write(target.obj)
             if options.sheet:
                 keys = [(x.source_name, x.name) for x in plan.layers if x.row.kind == "shape-keys"]
                 sheet = written.path(options.sheet)
@@ -131,7 +138,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
             write_map(plan.textures, options.texture_map, written)
         if plan.textures is not None and not options.pack_textures:
             write_pictures(target.obj, options.output, written)
-        lost = write_mesh(target.obj, options.output, written, backup=backup)
+        first, *others = target.objects
+        lost = write_mesh(first, options.output, written, backup=backup, others=others)
         if alignment and options.map:
             save_map(written.path(options.map), alignment, correspondence, *(x.rest for x in surfaces))
         if alignment and options.report:
@@ -157,6 +165,7 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
     if choices.kinds != ("textures",) or options.map or options.report or options.use_map or options.texture_map:
         raise Unreadable("--use-texture-map carries pictures and aligns nothing: say --only textures, and no other map")
     with opened_pair(options, write=True) as (source, target, notes):
+        _require_single(choices, source, target)
         surfaces = read_pair(options, source, target)
         tiles = read_map(options.use_texture_map)
         turns = read_turns(options.use_texture_map, tiles)
@@ -170,6 +179,22 @@ def _through_texture_map(options: argparse.Namespace, choices: TransferSettings)
         lost = write_mesh(target.obj, options.output, written, backup=backup)
     warn([*notes, *found.notes, *lost])
     say(f"{options.output}: {describe_counts({'textures': len(found.made)})} from {options.source}")
+
+
+def _require_single(choices: TransferSettings, source: Imported, target: Imported) -> None:
+    """Raise `Refusal` where several objects of a file cannot count as one."""
+    from ..mesh_data import Refusal
+
+    for imported, cannot, what in (
+        (source, choices.evaluated, "its modifiers are its own: --evaluated"),
+        (source, "textures" in choices.kinds, "its pictures have a layout of its own: --only textures"),
+        (target, "textures" in choices.kinds, "its pictures have a layout of its own: --only textures"),
+    ):
+        if imported.members and cannot:
+            raise Refusal(
+                f"'{imported.path}' has {len(imported.members)} mesh objects, and of each {what} takes one, named as "
+                f"{imported.path}:NAME, or all joined in Blender (Ctrl J)"
+            )
 
 
 def _require_writable(options: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ from .opening import Opened, opened
 from .publishing import Outputs, outputs, real_place, require_folder, require_place
 from .reading import Imported, chosen, import_mesh, import_meshes, new_scene, require_places
 from .unreadable import Unreadable
-from .writing import export_mesh, write_mesh
+from .writing import export_mesh, require_room, write_mesh
 
 __all__ = [
     "FORMATS",
@@ -30,6 +30,7 @@ __all__ = [
     "require_folder",
     "require_place",
     "require_places",
+    "require_room",
     "split_object_name",
     "write_mesh",
 ]

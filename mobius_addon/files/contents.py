@@ -185,7 +185,12 @@ def _missing_names(before: list[str], after: list[str]) -> list[str]:
 
 
 def _plain(name: str) -> str:
-    return re.sub(r"\W", "_", re.sub(r"\.\d{3}$", "", name)).lower()
+    return plain_letters(re.sub(r"\.\d{3}$", "", name))
+
+
+def plain_letters(name: str) -> str:
+    """Return a name without the letters that some kinds of files exchange for others."""
+    return re.sub(r"\W", "_", name).lower()
 
 
 def _places(obj: bpy.types.Object) -> Floats:

@@ -119,6 +119,9 @@ FORMATS = {
     ".gii": Format(gifti.read, gifti.write),
 }
 
+ONE_MESH = frozenset({".ply", ".stl", ".gii"})
+"""Endings of those that hold a single mesh."""
+
 
 @dataclass(frozen=True)
 class ReadOnly:

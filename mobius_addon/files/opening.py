@@ -11,11 +11,13 @@ from typing import Any
 
 import bpy
 
+from ..joined import joined
 from ..mesh_data import Refusal
 from ..streams import quiet, reading
 from .blend import require_local, with_shown
 from .formats import first_message, split_object_name
 from .reading import Imported, choose, import_meshes, new_scene, require_readable, scans
+from .together import together
 from .unreadable import Unreadable
 
 
@@ -38,7 +40,7 @@ class Opened:
 
 
 @contextmanager
-def opened(target: str, source: str | None = None, *, write: bool = True) -> Iterator[Opened]:
+def opened(target: str, source: str | None = None, *, write: bool = True, whole: bool = False) -> Iterator[Opened]:
     """Open the file of a mesh with all that is in it, for a mesh to be read and written wherever it is, hidden or not.
 
     In the context both objects are in a scene of their own, in Object Mode; afterwards all is as it was but for what
@@ -50,42 +52,66 @@ def opened(target: str, source: str | None = None, *, write: bool = True) -> Ite
         FILE or FILE:Object; of a .blend the file is opened, of others the meshes are imported into an empty one.
     write : bool
         The target is to be written.
+    whole : bool
+        Without a name all of a file's meshes are meant that are one thing, joined in the context; see `together`.
 
     Raises
     ------
     Unreadable
-        As `import_meshes` and `choose`.
+        As `import_meshes`, `choose` and `together`.
     Refusal
         The target is to be written and another file's; or both are one mesh.
     """
     target_path, target_name = split_object_name(target)
     source_path, source_name = split_object_name(source) if source is not None else (None, None)
+    one_file = source_path is not None and _same(source_path, target_path)
+    pick = together if whole and not one_file else _alone
     with ExitStack() as stack:
-        found, lent = None, None
-        if source_path is not None and not _same(source_path, target_path):
-            found = choose(_open_file(source_path), source_path, source_name)
-            lent = stack.enter_context(_library(found))
-        meshes = _open_file(target_path)
-        goal = choose(meshes, target_path, target_name)
-        if write:
-            require_local(goal.obj, target_path)
-        before = {block.session_uid for block in _everything()}
+        given: list[Imported] = []
         notes: list[str] = []
-        if source_path is not None and found is None:
-            found = choose(meshes, source_path, source_name)
-            if found.obj == goal.obj:
+        lent = None
+        if source_path is not None and not one_file:
+            given, notes = pick(_open_file(source_path), source_path, source_name)
+            lent = stack.enter_context(_library(given))
+        meshes = _open_file(target_path)
+        goals, more = pick(meshes, target_path, target_name)
+        notes += more
+        if write:
+            for goal in goals:
+                require_local(goal.obj, target_path)
+        before = {block.session_uid for block in _everything()}
+        if source_path is not None and one_file:
+            given, _ = pick(meshes, source_path, source_name)
+            if given[0].obj == goals[0].obj:
                 raise Refusal(f"'{source}' and '{target}' are one mesh: give two")
-            if found.obj.data == goal.obj.data:
+            if given[0].obj.data == goals[0].obj.data:
                 raise Refusal(f"'{source}' and '{target}' share one mesh: make it single-user, or there is one only")
-        elif found is not None and lent is not None:
-            found = replace(found, obj=_append(*lent))
-        objects = [x.obj for x in (goal, found) if x is not None]
-        with _object_mode(objects), _bench(objects):
-            yield Opened(goal, found, notes)
-            if lent is not None and found is not None:
-                notes += _leave_foreign_drivers(goal.obj, before, found.path)
+        elif lent is not None:
+            found = _append(*lent)
+            given = [replace(x, obj=obj) for x, obj in zip(given, found, strict=True)]
+        objects = [x.obj for x in (*goals, *given)]
+        with _object_mode(objects), _bench(objects), ExitStack() as wholes:
+            goal = wholes.enter_context(_as_one(goals))
+            yield Opened(goal, wholes.enter_context(_as_one(given)) if given else None, notes)
+            if lent is not None and given:
+                for obj in goal.objects:
+                    notes += _leave_foreign_drivers(obj, before, given[0].path)
         if lent is not None:
             _remove_unused(before)
+
+
+def _alone(meshes: list[Imported], path: Path, wanted: str | None) -> tuple[list[Imported], list[str]]:
+    return [choose(meshes, path, wanted)], []
+
+
+@contextmanager
+def _as_one(found: list[Imported]) -> Iterator[Imported]:
+    """Lend several objects of a file joined, one as it is."""
+    if len(found) == 1:
+        yield found[0]
+        return
+    with joined([x.obj for x in found], found[0].path.stem) as (whole, members):
+        yield Imported(found[0].path, whole.name, whole, members)
 
 
 def _same(path: Path, other: Path) -> bool:
@@ -107,34 +133,38 @@ def _open_file(path: Path) -> list[Imported]:
     except RuntimeError as error:
         raise Unreadable(f"'{path}' could not be read: {first_message(error)}") from error
     own, scenes = ([x for x in found if x.library is None] for found in (bpy.data.objects, bpy.data.scenes))
+    bpy.context.view_layer.update()
     return scans(path, [Imported(path, obj.name, obj) for obj in with_shown(own, scenes)])
 
 
 @contextmanager
-def _library(found: Imported) -> Iterator[tuple[Path, str]]:
-    """Lend a .blend that holds an object of the file that is open, and its name there."""
+def _library(found: list[Imported]) -> Iterator[tuple[list[Path], list[str]]]:
+    """Lend the .blend files that hold objects of the file that is open, one for each, and their names there."""
+    names = [x.obj.name for x in found]
     with tempfile.TemporaryDirectory(prefix="mobius-") as folder:
-        if found.obj.library is not None:
-            yield Path(bpy.path.abspath(found.obj.library.filepath)), found.obj.name
-        elif bpy.data.filepath:
-            yield Path(bpy.data.filepath), found.obj.name
-        else:
-            path = Path(folder) / "imported.blend"
+        path = Path(bpy.data.filepath) if bpy.data.filepath else Path(folder) / "imported.blend"
+        if not bpy.data.filepath and any(x.obj.library is None for x in found):
             with quiet():
                 bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, relative_remap=False, check_existing=False)
-            yield path, found.obj.name
+        libraries = (x.obj.library for x in found)
+        yield [path if x is None else Path(bpy.path.abspath(x.filepath)) for x in libraries], names
 
 
-def _append(path: Path, name: str) -> bpy.types.Object:
-    try:
-        with quiet(), bpy.data.libraries.load(str(path)) as (_, wanted):
-            wanted.objects = [name]
-    except (OSError, RuntimeError) as error:
-        raise Unreadable(f"'{name}' could not be read from '{path}': {first_message(error)}") from error
-    (obj,) = wanted.objects
-    if obj is None:
-        raise Unreadable(f"'{name}' could not be read from '{path}'")
-    return obj
+def _append(paths: list[Path], names: list[str]) -> list[bpy.types.Object]:
+    """Return objects of .blend files; those of one file come together, with one of what they share."""
+    found: dict[tuple[Path, str], bpy.types.Object] = {}
+    for path in dict.fromkeys(paths):
+        own = [name for other, name in zip(paths, names, strict=True) if other == path]
+        try:
+            with quiet(), bpy.data.libraries.load(str(path)) as (_, wanted):
+                wanted.objects = list(own)  # whose names become objects
+        except (OSError, RuntimeError) as error:
+            raise Unreadable(f"'{own[0]}' could not be read from '{path}': {first_message(error)}") from error
+        for name, obj in zip(own, wanted.objects, strict=True):
+            if obj is None:
+                raise Unreadable(f"'{name}' could not be read from '{path}'")
+            found[path, name] = obj
+    return [found[key] for key in zip(paths, names, strict=True)]
 
 
 @contextmanager

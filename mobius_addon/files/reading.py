@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -16,6 +17,12 @@ from .blend import missing_libraries
 from .formats import first_message, is_traceback, reader_of, split_object_name
 from .headers import require_sound
 from .unreadable import Unreadable, no_numbers
+
+if TYPE_CHECKING:
+    from ..joined import Member
+
+if TYPE_CHECKING:
+    pass
 
 
 def new_scene() -> None:
@@ -40,11 +47,19 @@ class Imported:
         The object's name there; the scene's other objects may force another on it.
     obj : bpy.types.Object
         The object.
+    members : tuple of Member
+        The objects that it was joined of, to be written in its place; none for an object of the file itself.
     """
 
     path: Path
     name: str
     obj: bpy.types.Object
+    members: tuple[Member, ...] = ()
+
+    @property
+    def objects(self) -> list[bpy.types.Object]:
+        """The file's own objects that this is."""
+        return [member.obj for member in self.members] or [self.obj]
 
     def order_change(self) -> str | None:
         """Return why the object's vertices are not numbered as in the file, or None if they are."""
@@ -183,17 +198,21 @@ def choose(meshes: list[Imported], path: Path, wanted: str | None) -> Imported:
     Unreadable
         It is not there, or there are several and none is named, or its vertices are at no place.
     """
-    found = chosen(meshes, path, wanted)
-    if len(found) > 1:
-        own = [x for x in found if x.obj.library is None]
-        found = own if len(own) == 1 else found
+    found = meant(meshes, path, wanted)
     if len(found) > 1:
         raise Unreadable(
-            f"'{path}' has {len(found)} mesh objects ({_listed(found)}): name one as {path}:NAME, "
+            f"'{path}' has {len(found)} mesh objects ({listed(found)}): name one as {path}:NAME, "
             "or join them in Blender (Ctrl J) to have all of them at once"
         )
     require_places(found[0])
     return found[0]
+
+
+def meant(meshes: list[Imported], path: Path, wanted: str | None) -> list[Imported]:
+    """Return the mesh that is named; without a name all, of which one that alone is not linked is meant alone."""
+    found = chosen(meshes, path, wanted)
+    own = [x for x in found if x.obj.library is None]
+    return own if len(own) == 1 else found
 
 
 def chosen(meshes: list[Imported], path: Path, wanted: str | None) -> list[Imported]:
@@ -210,10 +229,11 @@ def chosen(meshes: list[Imported], path: Path, wanted: str | None) -> list[Impor
         if imported.name == wanted:
             return [imported]
     missing = _what_is_missing()
-    raise Unreadable(f"'{path}' has no mesh object named '{wanted}': it has {_listed(meshes)}{missing}")
+    raise Unreadable(f"'{path}' has no mesh object named '{wanted}': it has {listed(meshes)}{missing}")
 
 
-def _listed(meshes: list[Imported]) -> str:
+def listed(meshes: list[Imported]) -> str:
+    """Return the first names of meshes, to be told."""
     return ", ".join(f"'{imported.name}'" for imported in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
 
 

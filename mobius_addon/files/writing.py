@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
+from ...solver.surface.mesh import plural
 from ..attributes import armature_of, forget_written
 from ..mesh_data import Refusal
 from ..streams import quiet
-from .contents import Contents, contents_of, losses
-from .formats import first_message, format_of
+from .contents import Contents, contents_of, losses, plain_letters
+from .formats import FORMATS, ONE_MESH, first_message, format_of
 from .parts import free_name
 from .pictures import separate_gltf_pictures, separate_pictures
 from .publishing import Outputs, real_place
 from .reading import new_scene
 
 
-def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: bool = False) -> list[str]:
+def write_mesh(
+    obj: bpy.types.Object,
+    final: Path,
+    written: Outputs,
+    *,
+    backup: bool = False,
+    others: Sequence[bpy.types.Object] = (),
+) -> list[str]:
     """Write a mesh object to what is to become a file, the whole file that is open if that is a .blend.
 
     Into another format the object goes alone, with its armature if the format has any; the file is read again, for
@@ -33,11 +41,13 @@ def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: 
     written : Outputs
     backup : bool
         Keep a .blend that is there as Blender does.
+    others : sequence of bpy.types.Object
+        Mesh objects that come along.
 
     Returns
     -------
     list of str
-        A sentence about what the object has and the file does not, if there is anything.
+        A sentence about what an object has and the file does not, for each where there is anything.
 
     Raises
     ------
@@ -45,21 +55,42 @@ def write_mesh(obj: bpy.types.Object, final: Path, written: Outputs, *, backup: 
         The file cannot be written, or not whole.
     """
     backup = backup and final.suffix.lower() == ".blend"
+    objects = [obj, *others]
     path = written.path(final, free_name(real_place(final)), backup=backup)
     if path.suffix == ".blend":
         _require_no_library(final)
         export_mesh(obj, path)
-        _require_whole(path, obj.name)
+        for one in objects:
+            _require_whole(path, one.name)
         return _newer(final)
-    forget_written(obj.data)  # a property that is of no use there
-    before = contents_of(obj)
-    export_mesh(obj, path, real_place(final).parent)
-    lost = losses(before, _read_again(path, before))
-    return [f"'{final}' is without {lost}: write a .blend to keep all"] if lost else []
+    for one in objects:
+        forget_written(one.data)  # a property that is of no use there
+    before = [contents_of(one) for one in objects]
+    names = [one.name for one in objects]
+    export_mesh(obj, path, real_place(final).parent, others)
+    lost = [losses(x, y) for x, y in zip(before, _read_again(path, before, names), strict=True)]
+    if len(objects) > 1:
+        return [
+            f"'{name}' in '{final}' is without {x}: write a .blend to keep all"
+            for name, x in zip(names, lost, strict=True)
+            if x
+        ]
+    return [f"'{final}' is without {x}: write a .blend to keep all" for x in lost if x]
 
 
-def export_mesh(obj: bpy.types.Object, path: Path, folder: Path | None = None) -> None:
-    """Write one object to a file, or the whole file that is open if that is a .blend.
+def require_room(number: int, final: Path) -> None:
+    """Raise `Refusal` where a kind of file does not hold as many meshes."""
+    if number > 1 and final.suffix.lower() in ONE_MESH:
+        raise Refusal(
+            f"'{final}' can hold one mesh and not {number}: write one of "
+            f"{' '.join(ending for ending in FORMATS if ending not in ONE_MESH)}"
+        )
+
+
+def export_mesh(
+    obj: bpy.types.Object, path: Path, folder: Path | None = None, others: Sequence[bpy.types.Object] = ()
+) -> None:
+    """Write one object, and others with it, to a file, or the whole file that is open if that is a .blend.
 
     Parameters
     ----------
@@ -69,6 +100,8 @@ def export_mesh(obj: bpy.types.Object, path: Path, folder: Path | None = None) -
     path : Path
     folder : Path, optional
         Where the file will lie in the end, whose other files keep their names; by default where it is written.
+
+    others : sequence of bpy.types.Object
 
     Raises
     ------
@@ -80,28 +113,30 @@ def export_mesh(obj: bpy.types.Object, path: Path, folder: Path | None = None) -
             if path.suffix.lower() == ".blend":
                 format_of(path).exporter(str(path.absolute()))
             else:
-                _export_alone(obj, path.absolute(), folder or path.absolute().parent)
+                _export_alone([obj, *others], path.absolute(), folder or path.absolute().parent)
     except (RuntimeError, OSError) as error:
         raise Refusal(f"'{path.name}' could not be written: {first_message(error)}") from error
 
 
-def _export_alone(obj: bpy.types.Object, path: Path, folder: Path) -> None:
+def _export_alone(objects: Sequence[bpy.types.Object], path: Path, folder: Path) -> None:
     ending = path.suffix.lower()
     copies = {".fbx": f"{path.stem}.fbm", ".usd": "textures", ".usda": "textures", ".usdc": "textures"}
     rigged = ending in (".glb", ".gltf", ".fbx")
-    with _alone(obj, armature_of(obj) if rigged else None), tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as stage:
+    armatures = [armature_of(obj) if rigged else None for obj in objects]
+    with _alone(objects, armatures), tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as stage:
         if ending not in (".glb", ".gltf", ".ply", ".stl"):
-            separate_pictures(obj, folder / copies.get(ending, "."), Path(stage))
+            for obj in objects:
+                separate_pictures(obj, folder / copies.get(ending, "."), Path(stage))
         format_of(path).exporter(str(path))
         if ending == ".gltf":
             separate_gltf_pictures(path, folder)
 
 
 @contextmanager
-def _alone(obj: bpy.types.Object, armature: bpy.types.Object | None = None) -> Iterator[None]:
-    """Show an object, wherever it is and whatever hides it, in a scene of its own, selected and active.
+def _alone(objects: Sequence[bpy.types.Object], armatures: Sequence[bpy.types.Object | None]) -> Iterator[None]:
+    """Show objects, wherever they are and whatever hides them, in a scene of their own, selected, the first active.
 
-    Its armature, if one is given, is there too, in its rest pose.
+    The armature of each, if one is given, is there too, in its rest pose.
     """
     scene, window = bpy.context.scene, bpy.context.window
     own = bpy.data.scenes.new(scene.name)
@@ -110,37 +145,39 @@ def _alone(obj: bpy.types.Object, armature: bpy.types.Object | None = None) -> I
         scene.unit_settings.scale_length,
     )
     own.frame_set(scene.frame_current)
-    for one in [obj] if armature is None else [armature, obj]:
+    movers = list(dict.fromkeys(x for x in armatures if x is not None))
+    of = dict(zip(objects, armatures, strict=True))
+    for one in [*movers, *objects]:
         at = one.matrix_world.copy()
         own.collection.objects.link(one)
         one.hide_viewport = one.hide_render = one.hide_select = False
-        if one == armature or one.parent != armature:
+        if one in movers or of[one] is None or one.parent != of[one]:
             one.parent = None
             one.matrix_world = at
         for constraint in one.constraints:
             constraint.mute = True
-    if armature is not None:
+    for armature in movers:
         armature.data.pose_position = "REST"
-    shown = [modifier for modifier in obj.modifiers if modifier.show_viewport or modifier.show_render]
-    for modifier in shown:
-        if armature is not None and modifier.type == "ARMATURE" and modifier.object == armature:
-            continue
-        modifier.show_viewport = modifier.show_render = False
+    for obj, armature in of.items():
+        for modifier in obj.modifiers:
+            if armature is not None and modifier.type == "ARMATURE" and modifier.object == armature:
+                continue
+            if modifier.show_viewport or modifier.show_render:
+                modifier.show_viewport = modifier.show_render = False
     window.scene = own
     try:
         bpy.context.view_layer.update()
-        obj.select_set(True)
-        if armature is not None:
-            armature.select_set(True)
-        bpy.context.view_layer.objects.active = obj
+        for one in [*objects, *movers]:
+            one.select_set(True)
+        bpy.context.view_layer.objects.active = objects[0]
         yield
     finally:
         window.scene = scene
         bpy.data.scenes.remove(own)
 
 
-def _read_again(path: Path, before: Contents) -> Contents:
-    """Return what a file that was just written holds.
+def _read_again(path: Path, before: Sequence[Contents], names: Sequence[str]) -> list[Contents]:
+    """Return what a file that was just written holds of each object.
 
     Raises
     ------
@@ -157,12 +194,18 @@ def _read_again(path: Path, before: Contents) -> Contents:
     # importers draw bones as a mesh
     drawn = {bone.custom_shape for x in bpy.data.objects if x.type == "ARMATURE" for bone in x.pose.bones}
     found = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj not in drawn]
-    if len(found) != 1:
-        raise Refusal(f"'{path.name}' was not written whole: {len(found)} meshes are in it")
-    after = contents_of(found[0])
-    if after.triangles < before.triangles:
-        gone = before.triangles - after.triangles
-        raise Refusal(f"'{path.name}' was not written whole: {gone:,} of {before.triangles:,} triangles are missing")
+    if len(found) != len(before):
+        raise Refusal(f"'{path.name}' was not written whole: {plural(len(found), 'mesh')} are in it")
+    if len(found) > 1:  # formats have letters of their own for what they do not allow in names
+        plain = {plain_letters(obj.name): obj for obj in found}
+        if len(plain) < len(found) or any(plain_letters(name) not in plain for name in names):
+            raise Refusal(f"'{path.name}' names its objects otherwise: write a .blend")
+        found = [plain[plain_letters(name)] for name in names]
+    after = [contents_of(obj) for obj in found]
+    for one, other in zip(before, after, strict=True):
+        if other.triangles < one.triangles:
+            gone = one.triangles - other.triangles
+            raise Refusal(f"'{path.name}' was not written whole: {gone:,} of {one.triangles:,} triangles are missing")
     return after
 
 

@@ -52,17 +52,18 @@ def fitting_pieces(
     MeshError
         A surface cannot be used as a whole, and has no piece that fits.
     """
-    if all((surface.cleaned.mesh.twins >= 0).all() for surface in (source, target)):
-        return source, target, ()  # the sphere takes both, or says why not
+    closed = all((surface.cleaned.mesh.twins >= 0).all() for surface in (source, target))
     clock.begin("flatten source", "Flattening the source", 0.0)
-    first = _why_cut(source)
+    first = _why_not_whole(source) if closed else _why_cut(source)
+    if closed and first is None:
+        return source, target, ()  # the sphere takes both, or says why not
     clock.begin("flatten target", "Flattening the target", 0.3)
-    second = _why_cut(target)
-    if not settings.cut or (first is None) == (
-        second is None
-    ):  # neither, or none that tells which piece of the other is shown
-        return source, target, ()
+    second = _why_not_whole(target) if closed else _why_cut(target)
     rest = clock.part(0.6, 1.0, "cut")
+    if not settings.cut or (second is None and (closed or first is None)):
+        return source, target, ()
+    if first is not None and second is not None:
+        return _like_pieces(source, target, (first, second), settings, rest)
     if first is not None:
         found, said = _piece_like(source, target, first, settings, rest, is_source=True)
         return found or source, target, said
@@ -82,6 +83,15 @@ def _why_cut(surface: Surface) -> str | None:
     if share > MUCH:
         return f"is too deep for one disc, where {share:.0%} of it would shrink by more than a million"
     return None
+
+
+def _why_not_whole(surface: Surface) -> str | None:
+    """Return why a closed surface does not go to the sphere, as the rest of a sentence; None if it does."""
+    try:
+        share = shrunk(surface.flattening)
+    except MeshError:
+        return "juts out too far for a sphere"
+    return f"is deep, {share:.0%} of it has hardly any room on a sphere" if share > MUCH else None
 
 
 def shrunk(flattening: Flat) -> float:
@@ -107,24 +117,15 @@ def _piece_like(
     mesh = whole.cleaned.mesh
     hanging = necks(mesh, width(other.flattening))
     pieces = sorted(hanging, key=lambda neck: _shape_difference(_submesh(mesh, neck), other.mesh))
-    best: tuple[bool, float, Surface, Neck] | None = None
+    best: tuple[tuple[bool, float], Surface, Neck] | None = None
     for shortest, stage in ((True, clock.part(0.1, 0.5)), (False, clock.part(0.5, 1.0))):
         chosen = [neck for neck in pieces if neck.shortest is shortest][:TRIED]
         for number, neck in enumerate(chosen):
-            said = f"cut where it is narrow, to a piece of {neck.share:.1%} of its area; the rest has no counterpart"
-            piece = whole.piece(neck.beyond, said)
-            part = stage.part(number / TRIED, (number + 1) / TRIED)
-            part.begin("cut", "Trying a piece", 0.0)
+            piece = whole.piece(neck.beyond, _cut(neck))
             pair = (piece, other) if is_source else (other, piece)
-            try:
-                rough = roughly_aligned(*pair, replace(settings, take_rival=False), part.part(0.0, 0.7), None)
-            except MeshError:  # no disc either
-                continue
-            draft, _, there = drafted_from(rough, part.part(0.7, 1.0))
-            found = rough.mobius.reflected, unlike(rough, draft, there), piece, neck
-            # of a left and a right one the one that need not be mirrored
-            if found[1] <= UNLIKE and (best is None or found[:2] < best[:2]):
-                best = found
+            fit = _fit(*pair, settings, stage.part(number / TRIED, (number + 1) / TRIED))
+            if fit is not None and (best is None or fit < best[0]):
+                best = fit, piece, neck
         if best is not None:
             break
     if best is None and reason == CLOSED:
@@ -140,8 +141,63 @@ def _piece_like(
         )
     if best is None:
         return None, ()
-    said = f"'{name}' {reason}: the piece that fits was found, {best[3].length:.3g} around where it was cut"
-    return best[2], (Remark("piece", said),)
+    said = f"'{name}' {reason}: the piece that fits was found, {best[2].length:.3g} around where it was cut"
+    return best[1], (Remark("piece", said),)
+
+
+def _like_pieces(
+    source: Surface, target: Surface, reasons: tuple[str, str], settings: AlignSettings, clock: Part
+) -> tuple[Surface, Surface, tuple[Remark, ...]]:
+    """Return those pieces of two surfaces, neither of which goes anywhere whole, that are told in most detail and fit.
+
+    Of bodies that people model this is the head. The surfaces themselves where no two pieces fit.
+    """
+    clock.begin("cut", "Looking where to cut", 0.0)
+    ours, theirs = (necks(surface.cleaned.mesh) for surface in (source, target))
+    ours = sorted(ours, key=lambda neck: -int(neck.beyond.sum()))[:TRIED]
+    for number, neck in enumerate(ours):
+        mine = source.piece(neck.beyond, _cut(neck))
+        if _why_cut(mine) is not None:
+            continue
+        stage = clock.part(0.1 + 0.9 * number / TRIED, 0.1 + 0.9 * (number + 1) / TRIED)
+        alike = sorted(
+            theirs, key=lambda other: _shape_difference(mine.cleaned.mesh, _submesh(target.cleaned.mesh, other))
+        )
+        best: tuple[tuple[bool, float], Surface, Neck] | None = None
+        for place, other in enumerate(alike[:TRIED]):
+            part = stage.part(place / TRIED, (place + 1) / TRIED)
+            yours = target.piece(other.beyond, _cut(other))
+            fit = _fit(mine, yours, settings, part) if _why_cut(yours) is None else None
+            if fit is not None and (best is None or fit < best[0]):
+                best = fit, yours, other
+        if best is not None:
+            said = tuple(
+                Remark(
+                    "piece",
+                    f"'{surface.original.name}' {reason}: of its pieces that fit the other the one with most vertices "
+                    f"was taken, {own.length:.3g} around where it was cut; for another one name a vertex group",
+                )
+                for surface, reason, own in ((source, reasons[0], neck), (target, reasons[1], best[2]))
+            )
+            return mine, best[1], said
+    return source, target, ()
+
+
+def _cut(neck: Neck) -> str:
+    return f"cut where it is narrow, to a piece of {neck.share:.1%} of its area; the rest has no counterpart"
+
+
+def _fit(source: Surface, target: Surface, settings: AlignSettings, clock: Part) -> tuple[bool, float] | None:
+    """Return whether two pieces fit mirrored only, and how little they are alike in a first draft; None: no fit."""
+    clock.begin("cut", "Trying a piece", 0.0)
+    try:
+        rough = roughly_aligned(source, target, replace(settings, take_rival=False), clock.part(0.0, 0.7), None)
+    except MeshError:  # no disc either
+        return None
+    draft, _, there = drafted_from(rough, clock.part(0.7, 1.0))
+    found = unlike(rough, draft, there)
+    # of a left and a right one the one that need not be mirrored
+    return (rough.mobius.reflected, found) if found <= UNLIKE else None
 
 
 def width(flattening: Flat) -> float:

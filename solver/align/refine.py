@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..flatten.domain import Domain
+from ..flatten.flatten import Flattening
 from ..flatten.locate import TriangulatedDisc
 from ..flatten.sphere import Flat
 from ..surface.mesh import Floats, Integers, Places
 from ..surface.sampling import HORIZON
+from .deep_ends import end_to_end
 
 MOST_VERTICES = 3000
 """Of larger sources every so many-th vertex is used: three parameters need no more."""
@@ -65,7 +67,17 @@ def refined(
             scale,
             None if progress is None else lambda done, n=number: progress((n + done) / len(stages)),
         )
-    return mobius
+    if not (isinstance(source, Flattening) and isinstance(target, Flattening)):
+        return mobius
+    met = end_to_end(mobius, source, target)
+
+    def value(trial: Any) -> float:
+        face, barycentric = target.triangles.locate(trial(source.places[used]))
+        there = np.einsum("qk,qkd->qd", barycentric, target_descriptors[target.triangles.faces[face]])
+        apart = ((source_descriptors[used] - there) ** 2).sum(axis=1)
+        return float((share * np.exp(-apart / (2 * scale**2))).sum())
+
+    return met if met is not None and value(met) > value(mobius) else mobius
 
 
 def _stages(depth: Floats, share: Floats) -> list[Integers]:

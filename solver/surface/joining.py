@@ -12,8 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from .gluing import Glue, starts, stops
-from .mesh import Floats, Integers
+from .gluing import Glue, glue_of, starts, stops
+from .mesh import Floats, Integers, TriangleMesh
 from .spikes import LONG
 
 TOUCHING = 1e-6
@@ -69,6 +69,26 @@ def coinciding(positions: Floats, faces: Integers, glue: Glue, keys: Floats | No
     length = np.linalg.norm(positions[stops(faces)] - positions[starts(faces)], axis=1)
     length = np.minimum(length, LONG * np.median(length))  # or a single spike would be most of a boundary
     return found.with_others(_turned_parts(whole, length, one[~opposed], other[~opposed]))
+
+
+def first_of_place(mesh: TriangleMesh, keys: Floats | None = None) -> Integers:
+    """Return the first of the vertices, (n,), that each one is one with where the surface is cut open; see above.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> first_of_place(TriangleMesh(np.array(corners), np.array([[0, 1, 2], [3, 4, 5]]))).tolist()
+    [0, 1, 2, 1, 4, 2]
+    """
+    faces, size = mesh.faces, len(mesh.vertices)
+    found = coinciding(mesh.vertices, faces, glue_of(faces, mesh.twins), keys)
+    start, stop = starts(faces), stops(faces)
+    left, right = found.left, found.right
+    one, other = np.where(found.opposed, stop[right], start[right]), np.where(found.opposed, start[right], stop[right])
+    links = np.concatenate([start[left], stop[left]]), np.concatenate([one, other])
+    graph = coo_array((np.ones(len(links[0]), np.int8), links), shape=(size, size))
+    label = connected_components(graph, directed=False)[1]
+    first = np.full(label.max(initial=-1) + 1, size)
+    np.minimum.at(first, label, np.arange(size))
+    return first[label]
 
 
 def _places(positions: Floats, start: Integers, stop: Integers, keys: Floats | None) -> Integers:

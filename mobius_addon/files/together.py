@@ -1,0 +1,90 @@
+"""Which of a file's mesh objects are one thing, as a head with its eyes and teeth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ...solver.surface.mesh import Floats
+from ..mesh_data import foreach
+from .reading import Imported, listed, meant, require_places
+from .unreadable import Unreadable
+
+_TWIN = 0.05
+"""Two whose boxes differ by less on every side, of the diagonal, are one thing twice.
+
+Of the heads and bodies at hand the part that fills most of the main one's box differs by 0.2; steps of detail by 0.01.
+"""
+
+
+def together(meshes: list[Imported], path: Path, wanted: str | None) -> tuple[list[Imported], list[str]]:
+    """Return the mesh that is named or, without a name, all that are one thing, the largest first, and what to say.
+
+    These are the shown ones whose boxes meet that of the largest, directly or by way of others.
+
+    Raises
+    ------
+    Unreadable
+        As `choose`; or the largest is there twice.
+    """
+    found = meant(meshes, path, wanted)
+    if len(found) == 1:
+        require_places(found[0])
+        return found, []
+    shown = [x for x in found if len(x.obj.data.polygons) and not _is_hidden(x)]
+    shown = shown or [x for x in found if len(x.obj.data.polygons)] or found[:1]
+    for imported in shown:
+        require_places(imported)
+    areas = [_area(x) for x in shown]
+    main = int(np.argmax(areas))
+    boxes = np.array([_box(x) for x in shown])
+    sizes = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
+    apart = np.abs(boxes - boxes[main]).max(axis=(1, 2))
+    twins = [x for k, x in enumerate(shown) if k != main and apart[k] < _TWIN * sizes[main]]
+    if twins:
+        raise Unreadable(
+            f"'{path}' has {len(found)} mesh objects ({listed(found)}), of which '{shown[main].name}' and "
+            f"'{twins[0].name}' fill the same place: name one as {path}:NAME, hide the other in Blender, or join what "
+            "belongs together (Ctrl J)"
+        )
+    meet = (boxes[:, None, 0] <= boxes[None, :, 1]).all(axis=2)
+    _, group = connected_components(coo_array(meet & meet.T), directed=False)
+    taken = [k for k in np.argsort(-np.array(areas), kind="stable") if group[k] == group[main]]
+    result = [shown[k] for k in taken]
+    notes = []
+    if len(result) > 1:
+        notes.append(f"{len(result)} mesh objects of '{path}' count as one ({listed(result)})")
+    if left := [x for x in found if x not in result]:
+        why = "hidden, without faces or apart from it"
+        notes.append(
+            f"of '{path}' {listed(left)} {'is' if len(left) == 1 else 'are'} left out, {why}: name one as {path}:NAME"
+        )
+    return result, notes
+
+
+def _is_hidden(imported: Imported) -> bool:
+    obj = imported.obj
+    return obj.hide_viewport or obj.hide_render or obj.display_type in ("BOUNDS", "WIRE") or obj.hide_get()
+
+
+def _places(imported: Imported) -> Floats:
+    own = foreach(imported.obj.data.vertices, "co", 3, np.float32).astype(np.float64)
+    matrix = np.array(imported.obj.matrix_world, dtype=np.float64)
+    return own @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _box(imported: Imported) -> Floats:
+    """Return the corners of an object's box in the world, (2, 3)."""
+    places = _places(imported)
+    return np.array([places.min(axis=0), places.max(axis=0)])
+
+
+def _area(imported: Imported) -> float:
+    """Return the area of an object's faces in the world."""
+    mesh = imported.obj.data
+    mesh.calc_loop_triangles()
+    corners = _places(imported)[foreach(mesh.loop_triangles, "vertices", 3, np.int32)]
+    return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
