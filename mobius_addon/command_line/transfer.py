@@ -150,7 +150,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
             write_report(written.path(options.report), figures)
     warn([*notes, *plan.warnings, *lost, *order])
     counts = describe_counts(plan.counts() | ({"data": len(data)} if data else {}))
-    say(f"{options.output}: {counts} from {options.source}{plan.unmatched.remark()}")
+    less = ", but for what the file is without" if lost and options.output.suffix.lower() != ".blend" else ""
+    say(f"{options.output}: {counts} from {options.source}{less}{plan.unmatched.remark()}")
 
 
 def _through_texture_map(options: argparse.Namespace, choices: TransferSettings) -> None:
