@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import bpy
 
+from .handlers import unwatch, watch
+
 
 def let_go(scene: bpy.types.Scene) -> None:
     """Forget a chosen object that is in no scene and no collection any more."""
@@ -18,26 +20,25 @@ def let_go(scene: bpy.types.Scene) -> None:
             settings.property_unset(role)
 
 
-@bpy.app.handlers.persistent
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
         _on_save()
 
 
-@bpy.app.handlers.persistent
 def _on_save(*_: object) -> None:
     for scene in bpy.data.scenes:
         if scene.is_editable:
             let_go(scene)
 
 
+_HANDLERS = (("depsgraph_update_post", _on_update), ("save_pre", _on_save))
+
+
 def register() -> None:
     """Watch for objects that are deleted."""
-    bpy.app.handlers.depsgraph_update_post.append(_on_update)
-    bpy.app.handlers.save_pre.append(_on_save)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Stop watching."""
-    bpy.app.handlers.save_pre.remove(_on_save)
-    bpy.app.handlers.depsgraph_update_post.remove(_on_update)
+    unwatch(*_HANDLERS)

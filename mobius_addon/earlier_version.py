@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..solver import TriangleMesh
+from .handlers import unwatch, watch
 
 
 def fingerprint(mesh: TriangleMesh) -> str:
@@ -32,24 +33,19 @@ def drop_pointers() -> None:
             kept.property_unset("source")
 
 
-@bpy.app.handlers.persistent
 def _on_file(*_: object) -> None:
     drop_pointers()
 
 
-def _handlers() -> list[list]:
-    # what is appended comes without load_post, and in Blender 4.2 without a word: then it is seen to when it is saved
-    appended = getattr(bpy.app.handlers, "blend_import_post", None)
-    return [bpy.app.handlers.load_post, bpy.app.handlers.save_pre, *([] if appended is None else [appended])]
+# what is appended comes without load_post, and in Blender 4.2 without a word: then it is seen to when it is saved
+_HANDLERS = tuple((name, _on_file) for name in ("load_post", "save_pre", "blend_import_post"))
 
 
 def register() -> None:
     """Watch for files."""
-    for handlers in _handlers():
-        handlers.append(_on_file)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Stop watching."""
-    for handlers in _handlers():
-        handlers.remove(_on_file)
+    unwatch(*_HANDLERS)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import bpy
 
+from .handlers import unwatch, watch
+
 Forget = Callable[[int | None], None]
 
 _listeners: list[Forget] = []
@@ -21,7 +23,6 @@ def ignore(forget: Forget) -> None:
     _listeners.remove(forget)
 
 
-@bpy.app.handlers.persistent
 def _on_edit(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         if update.is_updated_geometry:
@@ -31,26 +32,22 @@ def _on_edit(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
                     forget(uid)
 
 
-@bpy.app.handlers.persistent
 def _on_other_data(*_: object) -> None:
     for forget in _listeners:
         forget(None)
 
 
-def _all_data_changes() -> tuple[list[Callable[..., None]], ...]:
-    handlers = bpy.app.handlers
-    return handlers.load_post, handlers.undo_post, handlers.redo_post
+_HANDLERS = (
+    ("depsgraph_update_post", _on_edit),
+    *((name, _on_other_data) for name in ("load_post", "undo_post", "redo_post")),
+)
 
 
 def register() -> None:
     """Watch for edits."""
-    bpy.app.handlers.depsgraph_update_post.append(_on_edit)
-    for handlers in _all_data_changes():
-        handlers.append(_on_other_data)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Stop watching."""
-    bpy.app.handlers.depsgraph_update_post.remove(_on_edit)
-    for handlers in _all_data_changes():
-        handlers.remove(_on_other_data)
+    unwatch(*_HANDLERS)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import bpy
 
+from .handlers import unwatch, watch
 from .usable import by_uid
 
 SECONDS = 0.9
@@ -143,18 +144,15 @@ def _drivers(keys: Any, paths: Sequence[str]) -> list[Any]:
     return [driver for driver in found if driver.data_path in paths]
 
 
-_HANDLERS = ("save_pre", "undo_pre", "redo_pre", "load_pre")
-_stop = bpy.app.handlers.persistent(stop)
+_HANDLERS = tuple((name, stop) for name in ("save_pre", "undo_pre", "redo_pre", "load_pre"))
 
 
 def register() -> None:
     """Have what plays end before the file is saved, undone, redone or left."""
-    for name in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(_stop)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Undo `register`, and end what plays."""
     stop()
-    for name in _HANDLERS:
-        getattr(bpy.app.handlers, name).remove(_stop)
+    unwatch(*_HANDLERS)

@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 
 from . import comparison, viewport
+from .handlers import unwatch, watch
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,6 @@ _selections: dict[tuple[str, str], _Selection] = {}
 _views: list[viewport.Away] = []
 
 
-@bpy.app.handlers.persistent
 def _on_save(*_: Any) -> None:
     _selections.clear()
     _views.clear()
@@ -53,7 +53,6 @@ def _on_save(*_: Any) -> None:
             comparison.select_as_before(context)
 
 
-@bpy.app.handlers.persistent
 def _on_saved(*_: Any) -> None:
     copies = [obj for scene in bpy.data.scenes for obj in comparison.of_scene(scene)]
     for context in _windows():
@@ -80,22 +79,14 @@ def _windows() -> Any:
             yield bpy.context
 
 
-def _watched() -> tuple[tuple[list[Any], Any], ...]:
-    handlers = bpy.app.handlers
-    return (
-        (handlers.save_pre, _on_save),
-        (handlers.save_post, _on_saved),
-        (handlers.save_post_fail, _on_saved),
-    )
+_HANDLERS = (("save_pre", _on_save), ("save_post", _on_saved), ("save_post_fail", _on_saved))
 
 
 def register() -> None:
     """Watch for the file being saved."""
-    for handlers, follows in _watched():
-        handlers.append(follows)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Stop watching."""
-    for handlers, follows in _watched():
-        handlers.remove(follows)
+    unwatch(*_HANDLERS)

@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 
 from . import comparison, viewport
+from .handlers import unwatch, watch
 from .jobs import Job, redraw
 from .operators import side_by_side
 
@@ -48,13 +49,11 @@ def _soon() -> None:
         bpy.app.timers.register(follow, first_interval=0.0)
 
 
-@bpy.app.handlers.persistent
 def _on_undo(*_: Any) -> None:
     _undone.add("undo")
     _soon()
 
 
-@bpy.app.handlers.persistent
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     # deleting is an update of the collection; all else is none of ours
     if depsgraph.id_type_updated("COLLECTION") or depsgraph.id_type_updated("SCENE"):
@@ -63,24 +62,16 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             _soon()
 
 
-def _watched() -> tuple[tuple[list[Any], Any], ...]:
-    handlers = bpy.app.handlers
-    return (
-        (handlers.undo_post, _on_undo),
-        (handlers.redo_post, _on_undo),
-        (handlers.depsgraph_update_post, _on_update),
-    )
+_HANDLERS = (("undo_post", _on_undo), ("redo_post", _on_undo), ("depsgraph_update_post", _on_update))
 
 
 def register() -> None:
     """Watch for undo, redo and deletion."""
-    for handlers, follows in _watched():
-        handlers.append(follows)
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Stop watching."""
-    for handlers, follows in _watched():
-        handlers.remove(follows)
+    unwatch(*_HANDLERS)
     if bpy.app.timers.is_registered(follow):
         bpy.app.timers.unregister(follow)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -17,6 +19,19 @@ LEVELS = {
     "check": (n_("Check: {:.0%} matched"), "QUESTION"),
     "doubtful": (n_("Doubtful: {:.0%} matched"), "ERROR"),
 }
+
+
+COUNTS = {"good": n_("Good: {:,}"), "check": n_("Check: {:,}"), "doubtful": n_("Doubtful: {:,}")}
+
+
+def counted(levels: Iterable[str]) -> str:
+    """Return how many verdicts there are of each level, those that there are none of left out.
+
+    >>> counted(["doubtful", "good", "good"])
+    'Good: 2, Doubtful: 1'
+    """
+    number = Counter(levels)
+    return ", ".join(iface_(text).format(number[level]) for level, text in COUNTS.items() if number[level])
 
 
 def judgement_of(found: dict[str, Any]) -> Judgement:

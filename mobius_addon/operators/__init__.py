@@ -1,8 +1,7 @@
 """The verbs: one module per subject."""
 
-import bpy
-
 from .. import viewport
+from ..handlers import unwatch, watch
 from ..registration import register_factory
 from . import (
     align,
@@ -59,7 +58,6 @@ _register, _unregister = register_factory(
 )
 
 
-@bpy.app.handlers.persistent
 def _forget(*_: object) -> None:
     align.forget_last()
     viewport.forget_views()
@@ -68,11 +66,11 @@ def _forget(*_: object) -> None:
 def register() -> None:
     """Register the operators."""
     _register()
-    bpy.app.handlers.load_post.append(_forget)
+    watch(("load_post", _forget))
 
 
 def unregister() -> None:
     """Undo `register`."""
-    bpy.app.handlers.load_post.remove(_forget)
+    unwatch(("load_post", _forget))
     _forget()
     _unregister()

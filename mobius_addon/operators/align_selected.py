@@ -19,7 +19,8 @@ from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..translation import told
 from ..usable import why_not, why_not_mode, why_not_two
-from .align import Aligned, as_read, summary, write_alignment
+from ..verdict import counted, judgement_of, verdict_sentence
+from .align import Aligned, as_read, write_alignment
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,7 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
     def finish(self, context: bpy.types.Context, result: list[Aligned | str]) -> None:
         """Write on the source and each target that is still what was read; name the others."""
         source = as_read(*self._source, self._surface)
-        written = 0
+        levels: list[str] = []
         for target, done in zip(self._targets, result, strict=True):
             if isinstance(done, str):
                 self.report({"WARNING"}, f"{target.name}: {told(done)}")
@@ -123,9 +124,13 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
                     source, obj, done.alignment, done.correspondence, surfaces, frame=type(done.alignment.mobius)()
                 )
                 stored_alignment.store(obj, source, done.alignment, done.correspondence, surfaces)
-            written += 1
             for warning in filter(None, (unseen_warning(obj), *done.alignment.warnings)):
                 self.report({"WARNING"}, f"{target.name}: {told(warning)}")
-            self.report({"INFO"}, summary(source.name, obj.name, done.alignment, done.correspondence))
-        if not written:
+            if (found := stored_alignment.figures(obj)) is not None:
+                levels.append(judgement_of(found).level)
+                self.report({"INFO"}, verdict_sentence(context.scene, source, obj, found))
+        if not levels:
             raise Refusal(rpt_("None of the selected meshes could be aligned with '{}'").format(source.name))
+        if len(self._targets) > 1:  # the last report is what the status bar shows
+            text = rpt_("'{}' is aligned with {} of {} meshes: {}")
+            self.report({"INFO"}, text.format(source.name, len(levels), len(self._targets), counted(levels)))

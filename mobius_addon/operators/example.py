@@ -11,7 +11,8 @@ from .. import viewport
 from ..jobs import why_busy
 from ..usable import why_not_mode
 
-COLLECTION = "Mobius Example"
+COLLECTION = "Example Heads"
+"""Without "Mobius": who searches for an operator would find *Move to Collection > Mobius ...* first."""
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide.html"
 

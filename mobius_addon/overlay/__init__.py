@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 
 from .. import edits
+from ..handlers import unwatch, watch
 from .discs import draw_discs, draw_names
 from .legend import draw_legends, legends
 from .matches import Matches, draw_matches, matches_of
@@ -46,7 +47,6 @@ _PICTURES: dict[str, tuple[Any, str, Callable[[], None]]] = {
 }
 
 
-@bpy.app.handlers.persistent
 def _hide_all(*_: object) -> None:
     """Begin a file without pictures."""
     view = bpy.context.window_manager.mobius_view
@@ -56,12 +56,12 @@ def _hide_all(*_: object) -> None:
 def register() -> None:
     """Watch for edits and for other files."""
     edits.listen(forget)
-    bpy.app.handlers.load_post.append(_hide_all)
+    watch(("load_post", _hide_all))
 
 
 def unregister() -> None:
     """Remove every draw handler."""
-    bpy.app.handlers.load_post.remove(_hide_all)
+    unwatch(("load_post", _hide_all))
     edits.ignore(forget)
     for name in list(_handles):
         _PICTURES[name][0].draw_handler_remove(_handles.pop(name), "WINDOW")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..bend.bend import ROUNDS, Draft, drafted, finished
+from ..bend.bend import NODES, ROUNDS, Draft, drafted, finished
 from ..flatten.distortion import signed_areas
 from ..flatten.sphere import Flat
 from ..stages import Part
@@ -27,10 +27,13 @@ DRAFTS = 4
 """Drafts at most until the overlap is settled."""
 
 
-def drafted_from(found: Alignment, clock: Part, start: Floats | None = None) -> tuple[Draft, Booleans, Booleans]:
+def drafted_from(
+    found: Alignment, clock: Part, start: Floats | None = None, count: int = NODES
+) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
 
     It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
+    `count` vertices of the target are bent.
     """
     clock.begin("bend", "Bending", 0.0)
     source, target = found.source, found.target
@@ -42,7 +45,7 @@ def drafted_from(found: Alignment, clock: Part, start: Floats | None = None) -> 
         found.target_descriptors,
         found.difference,
     )
-    draft = drafted(found.mobius, source, target, believed, start, progress=clock.within(0.0, 0.15))
+    draft = drafted(found.mobius, source, target, believed, start, count=count, progress=clock.within(0.0, 0.15))
     return draft, *shared(draft, source, target, clock.within(0.15, 0.2))
 
 
@@ -62,7 +65,7 @@ def bent_densely(
         for _ in range(DRAFTS - 1):
             # pose and scale again, from where the surfaces meet
             believed = np.where(there, 1.0, 1e-3)
-            draft = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, still)
+            draft = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, progress=still)
             before = here, there
             here, there = shared(draft, source, target, still)
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:

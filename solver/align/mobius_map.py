@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
 from ..search.both_sides import search_both
-from ..search.branch_and_bound import SearchResult, search
+from ..search.branch_and_bound import search
 from ..search.fit import algebraic_fit
 from ..search.matching import Objective
+from ..search.outcome import SearchResult, SphereSearchResult
 from ..search.rival import LOOKED_AT, Rival, best_rival, scored
 from ..search.sphere_rival import best_sphere_rival, scored_on_sphere
-from ..search.sphere_search import SphereSearchResult
 from ..stages import Cancelled, Part
 from ..surface.mesh import Floats, Integers, MeshError, Places
 from .alignment import Alignment

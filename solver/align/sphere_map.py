@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..search.matching import Objective
-from ..search.sphere_search import SphereSearchResult, sphere_search
+from ..search.outcome import SphereSearchResult
+from ..search.sphere_search import sphere_search
 from ..stages import Cancelled, Part
 from .remark import Remark
 from .settings import AlignSettings

@@ -23,7 +23,7 @@ from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
 from .plate import NORMAL_WEIGHT, relaxed
-from .pose import in_pose, misfit, rigidly
+from .pose import FEW, NEARLY, in_pose, misfit, rigidly
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold import injective
 from .unfold_sphere import injective_on_sphere
@@ -121,6 +121,7 @@ def drafted(
     trust: Floats | None = None,
     start: Floats | None = None,
     rounds: int = DRAFT_ROUNDS,
+    count: int = NODES,
     progress: Callable[[float], None] | None = None,
 ) -> Draft:
     """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
@@ -142,6 +143,8 @@ def drafted(
         Möbius map puts them.
     rounds : int
         At most `ROUNDS`: how far the plate is relaxed.
+    count : int
+        Target vertices that are bent.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
     """
@@ -159,7 +162,7 @@ def drafted(
     whole, order = facing(target.mesh, mobius.reflected)
 
     tell(0.0)
-    few = coarse(target, NODES, order)
+    few = coarse(target, count, order)
     nodes, faces = few.nodes, few.faces
     tell(0.0)
     places = _positions(conformal[nodes], source, onto) if start is None else start[nodes]
@@ -192,16 +195,19 @@ def _best_start(
     unbent, above all where the images err. In the images' scale, `growth`, or in that in which the areas are the same.
     The one is taken that lies on the source best (`misfit`).
     """
-    best, least = None, np.inf
+    ways = []
     for scale in (growth, same_area):
         scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
         for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
+            rest = TriangleMesh(in_pose(TriangleMesh(way, flat.faces), onto, most=FEW), flat.faces)
+            ways.append((misfit(rest, onto), scaled, way, scale))
+    nearest = min(apart for apart, *_ in ways)
+    settled = []
+    for apart, scaled, way, scale in ways:
+        if apart <= NEARLY * nearest:
             rest = in_pose(TriangleMesh(way, flat.faces), onto)
-            apart = misfit(TriangleMesh(rest, flat.faces), onto)
-            if best is None or apart < least:
-                best, least = (scaled, rest, scale), apart
-    assert best is not None
-    return best
+            settled.append((misfit(TriangleMesh(rest, flat.faces), onto), scaled, rest, scale))
+    return min(settled, key=lambda one: one[0])[1:]
 
 
 def finished(

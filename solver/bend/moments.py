@@ -14,8 +14,14 @@ from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from .pose import in_pose, misfit
 
-FIRST_ROUNDS = 5
-"""Closest point rounds after which the poses are compared."""
+FEW, FEW_ROUNDS = 100, 5
+"""Vertices, about, and closest point rounds by which the poses are compared.
+
+On 12 pairs, mirrored and not, the best one was the same by three times as many vertices wherever it lay well.
+"""
+
+ASKED = 400
+"""Vertices of either surface that say how well a pose lies, where poses are compared."""
 
 KEPT = 3
 """Poses that are improved until they settle."""
@@ -32,8 +38,8 @@ def posed(mesh: TriangleMesh, onto: SurfacePoints) -> tuple[Floats, float]:
     tried = []
     for turn in _turns():
         x = (mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other
-        x = in_pose(TriangleMesh(x, mesh.faces), onto, FIRST_ROUNDS)
-        tried.append((misfit(TriangleMesh(x, mesh.faces), onto), x))
+        x = in_pose(TriangleMesh(x, mesh.faces), onto, FEW_ROUNDS, FEW)
+        tried.append((misfit(TriangleMesh(x, mesh.faces), onto, ASKED), x))
     best, least = tried[0][1], np.inf
     for _, x in sorted(tried, key=lambda pair: pair[0])[:KEPT]:
         settled = in_pose(TriangleMesh(x, mesh.faces), onto)

@@ -42,13 +42,10 @@ def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn:
     Vertices on a boundary that are `drawn`, (n,), are pulled to the source's boundary too, if it is near.
     """
     mesh = TriangleMesh(x, faces)
-    own = mesh.vertex_normals()
-    point, normal, beyond = onto.at(*onto.most_alike(x, own))
-    weight = np.where(beyond, 0.0, np.clip((own * normal).sum(axis=1), 0, 1) ** 2) * areas
-    distance = ((point - x) * normal).sum(axis=1)
-    deviation = np.sqrt(weight @ distance**2 / max(float(weight.sum()), 1e-12))
-    weight /= 1 + (distance / max(OUTLIER * deviation, 1e-6)) ** 2
+    weight, normal, distance = planes(x, mesh.vertex_normals(), areas, onto)
     stiffness, force = _along(normal, weight), (weight * distance)[:, None] * normal
+    if not drawn.any():
+        return stiffness, force
     rim = np.unique(mesh.edges[np.bincount(mesh.edge_of_side, minlength=len(mesh.edges)) == 1])
     rim = rim[drawn[rim]]
     if not len(rim):
@@ -59,6 +56,15 @@ def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn:
     stiffness[rim] += across
     force[rim] += np.einsum("nij,nj->ni", across, point - x[rim])
     return stiffness, force
+
+
+def planes(x: Floats, own: Floats, areas: Floats, onto: SurfacePoints) -> tuple[Floats, Floats, Floats]:
+    """Return how strongly, (n,), vertices with normals `own` are drawn to which planes: normals, (n, 3), distances."""
+    point, normal, beyond = onto.at(*onto.most_alike(x, own))
+    weight = np.where(beyond, 0.0, np.clip((own * normal).sum(axis=1), 0, 1) ** 2) * areas
+    distance = ((point - x) * normal).sum(axis=1)
+    deviation = np.sqrt(weight @ distance**2 / max(float(weight.sum()), 1e-12))
+    return weight / (1 + (distance / max(OUTLIER * deviation, 1e-6)) ** 2), normal, distance
 
 
 def relaxed(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
@@ -33,16 +35,25 @@ def smooth_rotations(
 
     Averaged over `length`, by trust, (n,).
     """
-    stiffness = _stiffness(rest)
-    i, j = rest.edges.T
     trust = np.ones(len(now)) if trust is None else trust
+    return _rotations(rest, _stiffness(rest), trust, length)(now)
+
+
+def _rotations(rest: TriangleMesh, stiffness: csr_array, trust: Floats, length: float) -> Callable[[Floats], Floats]:
+    """Return `smooth_rotations` as a function of `now` alone; `stiffness`: the mesh's, of `_stiffness`."""
+    i, j = rest.edges.T
     weight = -np.asarray(stiffness[i, j]).ravel() * np.sqrt(trust[i] * trust[j])
-    products = weight[:, None, None] * (now[i] - now[j])[:, :, None] * (rest.vertices[i] - rest.vertices[j])[:, None, :]
-    total = _summed(i, products, len(now)) + _summed(j, products, len(now))
+    side = (rest.vertices[i] - rest.vertices[j])[:, None, :]
     average = factorised(csc_array(diags_array(rest.vertex_areas * trust) + length**2 * stiffness))
-    u, _, v = np.linalg.svd(average(total.reshape(-1, 9)).reshape(-1, 3, 3))
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
-    return np.asarray(u @ v, np.float64)
+
+    def rotations(now: Floats) -> Floats:
+        products = weight[:, None, None] * (now[i] - now[j])[:, :, None] * side
+        total = _summed(i, products, len(now)) + _summed(j, products, len(now))
+        u, _, v = np.linalg.svd(average(total.reshape(-1, 9)).reshape(-1, 3, 3))
+        u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+        return np.asarray(u @ v, np.float64)
+
+    return rotations
 
 
 def turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: float, rounds: int = 3) -> Floats:
@@ -53,9 +64,10 @@ def turned_like(rest: TriangleMesh, places: Floats, trust: Floats, length: float
     side = rest.vertices[i] - rest.vertices[j]
     # the places hold it only over lengths beyond the surface's width, which is 1
     solve = factorised(csc_array(stiffness + diags_array(areas)))
+    rotations = _rotations(rest, stiffness, trust, length)
     now = places
     for _ in range(rounds):
-        turn = smooth_rotations(rest, now, trust, length)
+        turn = rotations(now)
         wanted = weight[:, None] * np.einsum("eij,ej->ei", (turn[i] + turn[j]) / 2, side)
         now = solve(_summed(i, wanted, len(now)) - _summed(j, wanted, len(now)) + areas[:, None] * places)
     return now

@@ -12,7 +12,7 @@ from ..align.confidence import expected_error
 from ..align.judgement import judge
 from ..align.whole import Whole
 from ..mobius import Mobius, SphereMobius
-from ..search.sphere_search import SphereSearchResult
+from ..search.outcome import SphereSearchResult
 from ..surface.mesh import Booleans
 from ..surface.parts import Parts
 from ..surface.tidy import Cleaned

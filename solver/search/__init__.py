@@ -6,7 +6,7 @@ is the same for points of two spheres.
 """
 
 from .branch_and_bound import search
-from .outcome import SearchResult
-from .sphere_search import SphereSearchResult, sphere_search
+from .outcome import SearchResult, SphereSearchResult
+from .sphere_search import sphere_search
 
 __all__ = ["SearchResult", "SphereSearchResult", "search", "sphere_search"]

@@ -288,17 +288,21 @@ class Search:
                 continue
             cells = cells[np.argsort(-cells[:, self.bound_at], kind="stable")]
             left = self._expanded(side, cells, budget, pool)
-            self.frontier[side] = np.concatenate([open_[~chosen], left])
+            self.frontier[side] = np.concatenate([open_[~chosen], self._open(left)])
             self._improve(side, left)
         self.close()
 
     def close(self) -> None:
         """Take off the frontier what cannot hold a better transformation, or is too small to be split."""
-        for side, open_ in enumerate(self.frontier):
-            alive = open_[open_[:, self.bound_at] > self.least]
-            ended = self._settled(alive)
-            self.finished_bound = max(self.finished_bound, alive[ended, self.bound_at].max(initial=-np.inf))
-            self.frontier[side] = alive[~ended]
+        self.frontier = [self._open(cells) for cells in self.frontier]
+
+    def _open(self, cells: Floats) -> Floats:
+        """Return the cells that are to be split further; what too small ones leave open is noted."""
+        alive = cells[:, self.bound_at] > self.least
+        ended = alive & self._settled(cells)
+        self.finished_bound = max(self.finished_bound, cells[ended, self.bound_at].max(initial=-np.inf))
+        stay = alive & ~ended
+        return cells if stay.all() else cells[stay]  # a frontier is large, and mostly stays
 
     def _settled(self, cells: Floats) -> Booleans:
         """Return which cells are not split further: what their bounds leave open is reported as a gap."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ..mobius import Mobius
+from ..mobius import Mobius, SphereMobius
 from ..stages import SearchProgress
 from ..surface.mesh import Integers
 from .matching import Matching
@@ -80,6 +80,53 @@ class SearchResult:
         Computed when it is asked for: for thousands of points that takes seconds, and 8 bytes per pair of matched ones.
         """
         return 0.0 if self.counted is None else one_to_one(*self.counted)
+
+
+@dataclass(frozen=True, eq=False)
+class SphereSearchResult(SearchResult):
+    """The outcome of a search on the sphere, complete or not.
+
+    `upper_bound` and `certified` are about all transformations with |h| <= h_max.
+
+    Attributes
+    ----------
+    mobius : SphereMobius
+    h_max : float
+    rotation : SphereMobius
+        The best rotation found, reflected or not.
+    rotation_value : float
+        Its Q.
+    rotation_bound : float
+        No rotation has a larger Q.
+    """
+
+    mobius: SphereMobius  # pyright: ignore[reportIncompatibleVariableOverride]
+    h_max: float = 0.0
+    rotation: SphereMobius = field(default_factory=SphereMobius)
+    rotation_value: float = 0.0
+    rotation_bound: float = np.inf
+
+    @property
+    def rotations_certified(self) -> bool:
+        """Whether it is proved that no rotation has a larger Q than the transformation found."""
+        return self.rotation_bound <= self.value
+
+    def as_reflected(self) -> SphereSearchResult:
+        """Return the result of a search on the reflected source as one on the source itself."""
+        mobius, rotation = (SphereMobius(x.h, x.rotation, True) for x in (self.mobius, self.rotation))
+        return replace(self, mobius=mobius, rotation=rotation)
+
+    @property
+    def proved(self) -> str:
+        """What is proved, in words."""
+        if self.certified and self.h_max > 0:
+            return f"no Möbius transformation with |h| <= {self.h_max:g} matches more"
+        if self.h_max > 0 and self.relative_gap < 0.5:
+            more = f"matches more than {100 * self.relative_gap:.1f} % more"
+            return f"no Möbius transformation with |h| <= {self.h_max:g} {more}"
+        if self.rotations_certified:
+            return "no rotation matches more"
+        return "nothing: time ran out"
 
 
 def one_to_one(problem: Matching, mobius: Mobius) -> float:

@@ -39,7 +39,7 @@ def test_all_selected_targets_share_the_layout_of_the_source() -> None:
     assert Job.current is None
 
 
-def test_one_that_cannot_be_aligned_does_not_stop_the_others() -> None:
+def test_one_that_cannot_be_aligned_does_not_stop_the_others(capfd: pytest.CaptureFixture[str]) -> None:
     source, target = make_sheet("S", 15), make_sheet("A", 11)
     bpy.ops.mesh.primitive_ico_sphere_add()
     ball = bpy.context.object
@@ -47,6 +47,11 @@ def test_one_that_cannot_be_aligned_does_not_stop_the_others() -> None:
     assert bpy.ops.mobius.align_selected(**QUICK) == {"FINISHED"}
     assert stored_alignment.exists(target, source)
     assert not stored_alignment.exists(ball, source)
+    out = capfd.readouterr().out
+    report = stored_alignment.figures(target)
+    level = report["verdict"].title()
+    assert f"'S' → 'A': {level}: {report['coverage']:.0%} matched; Mean error about" in out
+    assert f"'S' is aligned with 1 of 2 meshes: {level}: 1" in out
     choose(source, ball)
     with pytest.raises(RuntimeError, match="None of the selected meshes"):
         bpy.ops.mobius.align_selected(**QUICK)

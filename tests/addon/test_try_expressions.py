@@ -14,7 +14,7 @@ from mobius_extension.mobius_addon.operators.try_expressions import (  # noqa: E
     playable,
     why_not_played,
 )
-from mobius_extension.mobius_addon.playing import Play, _stop, stop  # noqa: E402
+from mobius_extension.mobius_addon.playing import Play, stop  # noqa: E402
 
 KEYS = ("eyeBlinkLeft", "jawOpen", "mouthSmile")
 
@@ -123,8 +123,8 @@ def test_whatever_ends_it_puts_all_back(pair: tuple[Any, Any], clock: list[float
     elif end == "stop":
         stop()
     elif end.endswith("_pre"):
-        assert _stop in getattr(bpy.app.handlers, end)
-        _stop(None, None)
+        assert stop in getattr(bpy.app.handlers, end)
+        stop(None, None)
     else:
         result = operator.modal(window, event(end))
         assert result == ({"FINISHED", "PASS_THROUGH"} if end == "Z" else {"FINISHED"})

@@ -1,11 +1,10 @@
 """Runs in Blender's window, driven by `gui_shot.sh`: the panel where work is done otherwise than in a fresh window.
 
-Another theme, scale and width, another mode, a second window, a linked mesh, a large one, one that cannot be used, and
+Another theme, scale and width, another mode, a second window, a linked mesh, one that cannot be used, and
 the search for commands. `bpy`, `PACKAGE`, `region`, `click`, `drag` and `shot` are the driver's.
 """
 
 import importlib
-import time
 from pathlib import Path
 
 import hand
@@ -17,8 +16,6 @@ Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
 comparison = importlib.import_module(PACKAGE + ".mobius_addon.comparison")
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
-SLOWEST = 1.5
-"""Times the processor's work for drawing the window that it may take once 100,000 faces are chosen, by software."""
 
 
 def steps() -> Wait:
@@ -36,7 +33,6 @@ def steps() -> Wait:
     yield from linked(names)
     yield from modes(names)
     yield from looks(names)
-    yield from large(names)
     print("[clicks] done", flush=True)
 
 
@@ -62,7 +58,7 @@ def searched(names: tuple[str, str]) -> Wait:
     bpy.ops.wm.search_menu("INVOKE_DEFAULT")
     yield 2.0
     pointer("type", "--delay", "60", "map mobius")
-    yield from picture("search")
+    yield from picture("search", 3.0)
     pointer("key", "Return")
     yield from until(lambda: Job.current is None and bool(target.data.mobius_transferred))
     yield 1.0
@@ -196,38 +192,3 @@ def refused() -> bool:
     except RuntimeError as error:
         return "library" in str(error) or "linked" in str(error)
     return False
-
-
-def large(names: tuple[str, str]) -> Wait:
-    """With 100,000 faces the window is drawn as fast as with none of it chosen, and ESC ends the work."""
-    settings = bpy.context.scene.mobius
-    source, target = (bpy.data.objects[name] for name in names)
-    settings.source = settings.target = None
-    for obj in (source, target):
-        modifier = obj.modifiers.new("Finer", "SUBSURF")
-        modifier.subdivision_type, modifier.levels = "SIMPLE", 2
-        bpy.context.view_layer.objects.active = obj
-        if obj.data.shape_keys is not None:
-            obj.shape_key_clear()
-        bpy.ops.object.modifier_apply(modifier=modifier.name)
-        print(f"[clicks] {obj.name} has {len(obj.data.polygons):,} faces", flush=True)
-    yield 1.0
-    without = drawn()
-    settings.source, settings.target = source, target
-    yield from picture("large", 3.0)
-    spent = drawn()
-    print(f"[clicks] drawing: {without:.2f} s without, {spent:.2f} s with 100,000 faces chosen", flush=True)
-    assert spent < without * SLOWEST
-    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **QUICK)
-    yield from until(lambda: Job.current is not None and Job.current.progress.fraction >= 0.1)
-    start = time.perf_counter()
-    hand.escape()
-    yield from until(lambda: Job.current is None, every=0.02)
-    print(f"[clicks] 100,000 faces: ESC ends it after {time.perf_counter() - start:.2f} s", flush=True)
-
-
-def drawn() -> float:
-    """Return how long the processor works to draw the window once."""
-    start = time.process_time()
-    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
-    return (time.process_time() - start) / 3

@@ -5,9 +5,11 @@ import pytest
 from scans import bumps, posed, remeshed
 
 from solver import AlignSettings, align
-from solver.align.hypotheses import by_pose
-from solver.align.reconsider import PROVED, _decided, in_doubt
+from solver.align.dense import drafted_from
+from solver.align.hypotheses import Hypothesis, by_pose
+from solver.align.reconsider import PROVED, _decided, _screened, in_doubt
 from solver.bend.bend import drafted
+from solver.stages import Stages
 
 SMALL = AlignSettings(samples=60, targets=400, reflect="auto")
 
@@ -73,3 +75,14 @@ def test_a_rigid_pose_implies_the_right_map(found):
     assert implied.value == pytest.approx(found.value, rel=0.1)
     assert hypothesis.start is not None
     assert hypothesis.start.shape == found.target.mesh.vertices.shape
+
+
+def test_few_vertices_show_which_hypotheses_are_lost(found):
+    """The right one is left beside a wrong first map; none beside the right one, which is no hypothesis once more."""
+    right = replace(found, bending=None, counterpart=None)
+    wrong = replace(right, mobius=replace(found.mobius, theta=found.mobius.theta + 2.0))
+    clock = Stages(None).part(0, 1)
+    tried = [Hypothesis(one, None, name) for one, name in ((right, "right"), (wrong, "wrong"))]
+    for first, left in ((wrong, ["right"]), (right, [])):
+        likely = _screened(found, first, drafted_from(first, clock), tried, clock)
+        assert [one.what for one in likely] == left
