@@ -144,6 +144,19 @@ def test_one_rig_moves_all(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert [x.data.bones.keys() for x in movers] == [["Jaw"]]
 
 
+def test_what_was_carried_before_is_replaced(folder: Path) -> None:
+    source, out = folder / "source.blend", folder / "out.blend"
+    flags = [*QUICK, "--only", "vertex-groups"]
+    assert main(["transfer", str(source), str(folder / "target.blend"), "-o", str(out), *flags]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(source))
+    bpy.data.objects["Source"].vertex_groups["Jaw"].add(range(300), 0.7, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    assert main(["transfer", str(source), str(out), "-o", str(out), "--overwrite", *flags]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    assert bpy.data.objects["Target"].vertex_groups.keys() == ["Jaw"]
+    assert weights(bpy.data.objects["Target"], "Jaw").max() == pytest.approx(0.7)
+
+
 def test_textures_need_one_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = [str(folder / "source.blend"), str(folder / "target.blend"), "-o", str(folder / "out.blend")]
     assert main(["transfer", *given, "--only", "textures"]) == 1
