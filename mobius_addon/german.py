@@ -512,7 +512,7 @@ GERMAN = {
     "Trying the next best map": "Die nächstbeste Abbildung versuchen",
     "Trying the other end": "Das andere Ende versuchen",
     "Trying the other side": "Die andere Seite versuchen",
-    "Correct by Point Pairs": "Durch Punktpaare korrigieren",
+    "Correct by Point Pairs": "Punktpaar-Korrektur",
     "Add Point Pair": "Punktpaar hinzufügen",
     "Click on a point of one mesh and on where it belongs on the other: the map is bent through them at once": "Auf einen Punkt eines Meshes klicken und dorthin, wohin er auf dem anderen gehört: Die Abbildung wird sofort durch beide gebogen",
     "Click on '{}'": "Auf „{}“ klicken",

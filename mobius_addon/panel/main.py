@@ -67,8 +67,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     icon = {True: "CHECKMARK", False: "ERROR", None: "QUESTION"}[line.is_disc]
     row = column.row(align=True)
     texts = row.column(align=True)
+    buttons = bool(line.selectable) + bool(line.edits)
     for number, text in enumerate(line.rows):
-        draw_wrapped(texts, context, text, "BLANK1" if number else icon)
+        draw_wrapped(texts, context, text, "BLANK1" if number else icon, buttons=buttons)
     if line.selectable:
         button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         button.object_name, button.edit = obj.name, True

@@ -76,10 +76,12 @@ def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, senten
         draw_wrapped(layout, context, text, "BLANK1" if number else icon)
 
 
-def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
-    """Draw a sentence in as many rows as the region's width needs."""
-    # a letter of Blender's font is 6 pixels wide on average; tabs, margins and the icon take 80
-    letters = max(16, int((_width(context) - 80) / 6.2))
+def draw_wrapped(
+    layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str, *, buttons: int = 0
+) -> None:
+    """Draw a sentence in as many rows as the region's width needs, where so many icons are buttons beside it."""
+    # a letter of Blender's font is 6 pixels wide on average; tabs, margins and the icon take 80, a button 20
+    letters = max(16, int((_width(context) - 80 - 20 * buttons) / 6.2))
     for number, row in enumerate(textwrap.wrap(sentence, letters)):
         layout.label(text=row, icon="BLANK1" if number else icon, translate=False)
 
