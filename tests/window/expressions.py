@@ -40,7 +40,8 @@ def steps() -> Wait:
     yield from picture("expressions-aligned", 3.0)
     yield from click_on((yield from find("bpy.ops.mobius.transfer", upwards=True)))
     yield from until(lambda: Job.current is None and target.data.shape_keys is not None)
-    bpy.utils.unregister_class(panels.MOBIUS_PT_transfer)  # so that the sidebar need not be scrolled
+    for folded in (panels.MOBIUS_PT_proof, panels.MOBIUS_PT_notes, panels.MOBIUS_PT_parts, panels.MOBIUS_PT_pairs):
+        bpy.utils.unregister_class(folded)  # so that the sidebar need not be scrolled
     yield 2.0
     keys = target.data.shape_keys.key_blocks
     keys[3].value = 0.25  # of the person's own
