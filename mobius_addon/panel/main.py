@@ -29,7 +29,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         """Draw the panel."""
         layout, settings = self.layout, context.scene.mobius
         _draw_picker(layout, context, "source")
-        row = beside_or_below(layout, context)
+        row = beside_or_below(layout, context, "Swap", MOBIUS_OT_use_selected.bl_label)
         row.operator(MOBIUS_OT_swap.bl_idname, text="Swap", icon="FILE_REFRESH")
         row.operator(MOBIUS_OT_use_selected.bl_idname, icon="RESTRICT_SELECT_OFF")
         _draw_picker(layout, context, "target")

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import stored_alignment
 
@@ -86,9 +87,12 @@ def draw_wrapped(
         layout.label(text=row, icon="BLANK1" if number else icon, translate=False)
 
 
-def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
-    """Return a row for two buttons or, in a narrow sidebar, a column."""
-    return layout.row(align=True) if _width(context) >= 260 else layout.column(align=True)
+def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context, *labels: str) -> bpy.types.UILayout:
+    """Return a row for two buttons with icons or, where their labels would be cut off, a column."""
+    # as in `draw_wrapped`: tabs and margins take 60, an icon with its margins 26
+    letters = int(((_width(context) - 60) / 2 - 26) / 6.2)
+    fits = all(len(iface_(label, "Operator")) <= letters for label in labels)
+    return layout.row(align=True) if fits else layout.column(align=True)
 
 
 def _width(context: bpy.types.Context) -> float:
