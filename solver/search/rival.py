@@ -70,8 +70,8 @@ def best_rival(
     z_max, time_limit, threads, progress, most_nodes :
         As for `search`.
     enough : float, optional
-        The search ends as soon as it is decided whether a rival has this Q, and `at_least` cells have been looked at; if
-        that is 0, nothing below it is looked for, which takes less than half the time.
+        The search ends as soon as it is decided whether a rival has this Q, and `at_least` cells have been looked at.
+        If that is 0, nothing below it is looked for, which takes less than half the time.
     """
     reflected = known[0].reflected
     seen = np.conj(objective.source) if reflected else objective.source
