@@ -7,6 +7,7 @@ GERMAN_SENTENCES = {
     "ambiguous: a map that sends everything elsewhere scores within {} % of the samples of the best; is the surface symmetric?": "Mehrdeutig: Eine Abbildung, die alles anderswohin bringt, liegt bis auf {} % der Punkte an der besten; ist die Fläche symmetrisch?",
     "ambiguous: a map that sends everything elsewhere scores within {} % of the samples of the best; is the surface symmetric? The rival is taken, as asked": "Mehrdeutig: Eine Abbildung, die alles anderswohin bringt, liegt bis auf {} % der Punkte an der besten; ist die Fläche symmetrisch? Wie verlangt wird der Rivale genommen",
     "ambiguous: the best map of the pieces by themselves sends everything elsewhere": "Mehrdeutig: Die beste Abbildung der Stücke für sich bringt alles anderswohin",
+    "not proved optimal: a value up to {} % larger was not excluded with the work given": "Nicht als beste bewiesen: Ein um bis zu {} % größerer Wert war mit dem gegebenen Aufwand nicht auszuschließen",
     "not proved optimal: a value up to {} % larger was not excluded in the time given": "Nicht als beste bewiesen: Ein um bis zu {} % größerer Wert war in der gegebenen Zeit nicht auszuschließen",
     "reconsidered: the best map of the search fits less well than {}, which is taken": "Neu erwogen: Die beste Abbildung der Suche passt schlechter als {}, die genommen wird",
     "the mirrored one": "die gespiegelte",

@@ -11,6 +11,8 @@ import bpy
 import numpy as np
 
 from ..solver.surface.mesh import Floats, Integers
+from .attributes.record import remember, unedited
+from .attributes.table import ROWS
 from .mesh_data import foreach, is_mirrored
 from .streams import quiet
 
@@ -75,6 +77,7 @@ def joined(objects: Sequence[bpy.types.Object], name: str) -> Iterator[tuple[bpy
         if whole.name not in collection.objects and collection.is_editable:
             collection.objects.link(whole)
     found = {domain: _taken_off(whole.data, domain) for domain in _DOMAINS}
+    remember(whole, (), _written_on_all(objects))
     members = tuple(
         Member(obj, {domain: found[domain][own.start : own.stop] for domain, own in mine.items()}, back)
         for obj, mine, back in zip(objects, ranges, [np.linalg.solve(x, turn[0]) for x in turn], strict=True)
@@ -86,6 +89,16 @@ def joined(objects: Sequence[bpy.types.Object], name: str) -> Iterator[tuple[bpy
         bpy.data.objects.remove(whole)
         if not mesh.users:
             bpy.data.meshes.remove(mesh)
+
+
+def _written_on_all(objects: Sequence[bpy.types.Object]) -> list[tuple[str, str, str]]:
+    """Return which layers earlier transfers wrote, by kind, name and source's name, and no object has as its own."""
+    known, own = {}, set()
+    for obj in objects:
+        written = {(x.kind, x.name): x.source_name for x in unedited(obj)}
+        known |= written
+        own |= {(row.kind, name) for row in ROWS for name in row.access.names(obj)} - written.keys()
+    return [(*layer, source_name) for layer, source_name in known.items() if layer not in own]
 
 
 def _numbered(mesh: bpy.types.Mesh, domain: str, offsets: dict[str, int]) -> range:

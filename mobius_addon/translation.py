@@ -10,7 +10,7 @@ from .german import GERMAN
 from .german_sentences import GERMAN_SENTENCES
 
 LANGUAGES = {"de_DE": GERMAN | GERMAN_SENTENCES, "de": GERMAN | GERMAN_SENTENCES}
-"""By Blender's names of languages: 'de_DE' up to 4.4, 'de' from 4.5 on."""
+"""By Blender's names of languages, which differ between its builds: with the country or without."""
 
 _CONTEXTS = ("*", "Operator")
 """Where Blender looks a text up: as that of a property, label or panel, or as that of an operator's button."""

@@ -21,8 +21,8 @@ MOST_PICTURES = 120
 MOST_ROWS = 200
 """Maps not to be trusted that are listed, at most; pairs.csv has all."""
 
-LABELLED = 60
-"""Rows of a matrix up to which they have names."""
+LABELLED, LEGIBLE = 200, 11.0
+"""Rows of a matrix up to which they have names, and pixels that each then has at least: what does not fit scrolls."""
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1080px; padding: 0 1em; color: #222; }
@@ -112,9 +112,11 @@ def _matrix(distances: Floats, names: list[str], order: list[int], bad: set[tupl
     near, far = np.array([0.07, 0.16, 0.33]), np.array([0.91, 0.95, 0.98])
     known = np.isfinite(found)
     colors[known, :3] = near + np.sqrt(share[known])[:, None] * (far - near)
-    cell = max(3.0, min(28.0, 900 / len(names)))
+    named = len(names) <= LABELLED
+    cell = max(LEGIBLE if named else 3.0, min(28.0, 900 / len(names)))
     side = cell * len(names)
-    label = 8.0 * max(map(len, names)) if len(names) <= LABELLED else 0.0
+    letters = min(12.0, 0.85 * cell)
+    label = 8 / 12 * letters * max(map(len, names)) if named else 0.0
     parts = [
         f'<image href="{inline(colors)}" width="{side:.1f}" height="{side:.1f}" style="image-rendering: pixelated" '
         'preserveAspectRatio="none"/>'
@@ -129,7 +131,7 @@ def _matrix(distances: Floats, names: list[str], order: list[int], bad: set[tupl
     if label:
         for k, name in enumerate(names):
             middle = (k + 0.5) * cell
-            text = f'font-size="{min(12.0, 0.8 * cell):.1f}" dominant-baseline="central"'
+            text = f'font-size="{letters:.1f}" dominant-baseline="central"'
             parts.append(f'<text x="{side + 5:.1f}" y="{middle:.1f}" {text}>{escape(name)}</text>')
             parts.append(
                 f'<text transform="translate({middle:.1f} {side + 5:.1f}) rotate(90)" {text}>{escape(name)}</text>'
@@ -139,8 +141,8 @@ def _matrix(distances: Floats, names: list[str], order: list[int], bad: set[tupl
     )
     width, height = side + label + 8, side + label + 26
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
-        f'font-family="system-ui, sans-serif">{"".join(parts)}</svg>'
+        f'<div class="wide"><svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
+        f'width="{width:.0f}" font-family="system-ui, sans-serif">{"".join(parts)}</svg></div>'
     )
 
 

@@ -15,11 +15,11 @@ NAMED = 400
 SIDE, COLUMN, ROW = 64, 128, 92
 """Pixels of a picture, and from one to the next."""
 
-DOT_COLUMN, DOT_ROW = 60, 15
+DOT_COLUMN, DOT_ROW = 62, 20
 """The same of dots."""
 
-LETTERS = 17
-"""Letters of a name that fit under a picture."""
+LETTERS, DOT_LETTERS = 17, 10
+"""Letters of a name that fit under a picture, and over a dot that lines go on from."""
 
 
 def short(name: str, most: int) -> str:
@@ -87,7 +87,10 @@ def draw_paths(collection: Collection, pictures: dict[str, str], bad: set[tuple[
         if pictured:
             text = f'x="{x:.0f}" y="{y + side / 2 + 11:.1f}" font-size="11" text-anchor="middle"'
             nodes.append(f"<text {text}{weight}>{escape(short(collection.names[number], LETTERS))}</text>")
-        elif len(found) <= NAMED and (number not in inner or number == collection.root):
+        elif len(found) <= NAMED and number in inner and number != collection.root:
+            text = f'x="{x:.0f}" y="{y - 6:.1f}" font-size="8" text-anchor="middle" fill="#555"'
+            nodes.append(f"<text {text}>{escape(short(collection.names[number], DOT_LETTERS))}</text>")
+        elif len(found) <= NAMED:
             anchor = 'text-anchor="end"' if number == collection.root else ""
             x += -8 if anchor else 8
             nodes.append(f'<text x="{x:.0f}" y="{y + 4:.1f}" font-size="11" {anchor}{weight}>{name}</text>')

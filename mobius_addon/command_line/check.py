@@ -19,7 +19,7 @@ def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
     from ...solver import MeshError, verdict
     from ...solver.align.held import held
-    from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name
+    from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name, together
     from ..mesh_data import read_surface
 
     status = DONE
@@ -49,4 +49,11 @@ def run(options: argparse.Namespace) -> int:
                 line = "cannot be used: it " + str(error).removeprefix(f"'{name}' ")
                 status = max(status, NOT_ALIGNED)
             say(f"{name}: {line}")
+        if len(found) > 1:
+            try:
+                notes = together(found, path, wanted)[1]
+            except Unreadable as error:
+                notes = [str(error)]
+            for note in notes:
+                say(note)
     return status

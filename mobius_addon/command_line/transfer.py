@@ -150,7 +150,8 @@ def _transfer_to(options: argparse.Namespace) -> None:
             write_report(written.path(options.report), figures)
     warn([*notes, *plan.warnings, *lost, *order])
     counts = describe_counts(plan.counts() | ({"data": len(data)} if data else {}))
-    say(f"{options.output}: {counts} from {options.source}{plan.unmatched.remark()}")
+    less = ", but for what the file is without" if lost and options.output.suffix.lower() != ".blend" else ""
+    say(f"{options.output}: {counts} from {options.source}{less}{plan.unmatched.remark()}")
 
 
 def _through_texture_map(options: argparse.Namespace, choices: TransferSettings) -> None:
@@ -185,15 +186,13 @@ def _require_single(choices: TransferSettings, source: Imported, target: Importe
     """Raise `Refusal` where several objects of a file cannot count as one."""
     from ..mesh_data import Refusal
 
-    for imported, cannot, what in (
-        (source, choices.evaluated, "its modifiers are its own: --evaluated"),
-        (source, "textures" in choices.kinds, "its pictures have a layout of its own: --only textures"),
-        (target, "textures" in choices.kinds, "its pictures have a layout of its own: --only textures"),
-    ):
-        if imported.members and cannot:
+    flag = "--only textures" if "textures" in choices.kinds else "--evaluated"
+    sides = (source, target) if "textures" in choices.kinds else (source,) if choices.evaluated else ()
+    for imported in sides:
+        if imported.members:
             raise Refusal(
-                f"'{imported.path}' has {len(imported.members)} mesh objects, and of each {what} takes one, named as "
-                f"{imported.path}:NAME, or all joined in Blender (Ctrl J)"
+                f"'{imported.path}' has {len(imported.members)} mesh objects, and {flag} takes one: name it as "
+                f"{imported.path}:NAME, or join what belongs together in Blender (Ctrl J)"
             )
 
 

@@ -5,6 +5,7 @@ from .landmark_file import read_landmarks, read_point_pairs
 from .opening import Opened, opened
 from .publishing import Outputs, outputs, real_place, require_folder, require_place
 from .reading import Imported, chosen, import_mesh, import_meshes, new_scene, require_places
+from .together import together
 from .unreadable import Unreadable
 from .writing import export_mesh, require_room, write_mesh
 
@@ -32,5 +33,6 @@ __all__ = [
     "require_places",
     "require_room",
     "split_object_name",
+    "together",
     "write_mesh",
 ]

@@ -63,6 +63,9 @@ class Imported:
 
     def order_change(self) -> str | None:
         """Return why the object's vertices are not numbered as in the file, or None if they are."""
+        if self.members:
+            names = ", ".join(f"'{obj.name}'" for obj in self.objects)
+            return f"those of {names} one after another"
         if self.path.suffix.lower() == ".obj":
             with self.path.open("rb") as lines:
                 dropped = sum(line.startswith(b"v ") for line in lines) - len(self.obj.data.vertices)

@@ -13,10 +13,10 @@ from ..mesh_data import foreach
 from .reading import Imported, listed, meant, require_places
 from .unreadable import Unreadable
 
-_TWIN = 0.05
+_TWIN = 0.1
 """Two whose boxes differ by less on every side, of the diagonal, are one thing twice.
 
-Of the heads and bodies at hand the part that fills most of the main one's box differs by 0.2; steps of detail by 0.01.
+Of the heads and bodies at hand the part most like the skin differs by 0.38, a tenth of a skin's vertices by 0.06.
 """
 
 

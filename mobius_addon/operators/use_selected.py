@@ -7,7 +7,7 @@ from ..comparison import is_copy
 
 
 class MOBIUS_OT_use_selected(bpy.types.Operator):
-    """Make the active mesh the source and the other selected one the target."""
+    """Make the active mesh the source and the other selected one the target; of several the first by name."""
 
     bl_idname = "mobius.use_selected"
     bl_label = "Use Selected"
@@ -15,17 +15,27 @@ class MOBIUS_OT_use_selected(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Allow for two selected meshes, one of them active."""
-        chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and not is_copy(obj)]
-        if len(chosen) != 2 or context.object not in chosen:
-            cls.poll_message_set(rpt_("Select two meshes, the source last: it is the active one"))
+        """Allow for selected meshes, one of them active."""
+        chosen = _chosen(context)
+        if len(chosen) < 2 or context.object not in chosen:
+            cls.poll_message_set(rpt_("Select the target, or several, and the source last: it is the active one"))
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Choose them."""
         settings, source = context.scene.mobius, context.object
-        target = next(obj for obj in context.selected_objects if obj.type == "MESH" and obj != source)
-        settings.source, settings.target = source, target
-        self.report({"INFO"}, rpt_("From '{}' to '{}'").format(source.name, target.name))
+        targets = [obj for obj in _chosen(context) if obj != source]
+        settings.source, settings.target = source, targets[0]
+        if len(targets) > 1:
+            text = rpt_("From '{}' to {} meshes: press Align Selected")
+            self.report({"INFO"}, text.format(source.name, len(targets)))
+        else:
+            self.report({"INFO"}, rpt_("From '{}' to '{}'").format(source.name, targets[0].name))
         return {"FINISHED"}
+
+
+def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Return the selected meshes by name."""
+    chosen = [obj for obj in context.selected_objects if obj.type == "MESH" and not is_copy(obj)]
+    return sorted(chosen, key=lambda obj: obj.name)

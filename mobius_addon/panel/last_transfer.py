@@ -32,7 +32,7 @@ class MOBIUS_PT_last_transfer(MobiusPanel, bpy.types.Panel):
         layout, found = self.layout, _found(context)
         if found is None:
             return
-        layout.label(text=iface_("From '{}'").format(found.source), icon="CHECKMARK", translate=False)
+        draw_wrapped(layout.column(align=True), context, iface_("From '{}'").format(found.source), "CHECKMARK")
         if any(layer.kind == "shape-keys" for layer in found.layers):
             layout.operator(MOBIUS_OT_try_expressions.bl_idname, icon="PLAY", depress=Play.current is not None)
         for kind in KINDS:
@@ -41,7 +41,7 @@ class MOBIUS_PT_last_transfer(MobiusPanel, bpy.types.Panel):
                 _draw_kind(layout, iface_(kind.label), layers)
         if found.uncertain:
             text = iface_("{:.1%} of the area is uncertain").format(found.uncertain)
-            layout.label(text=text, icon="QUESTION", translate=False)
+            draw_wrapped(layout.column(align=True), context, text, "QUESTION")
         for sentence in found.warnings:
             draw_wrapped(layout.column(align=True), context, sentence, "ERROR")
 

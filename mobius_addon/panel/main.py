@@ -29,7 +29,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
         """Draw the panel."""
         layout, settings = self.layout, context.scene.mobius
         _draw_picker(layout, context, "source")
-        row = beside_or_below(layout, context)
+        row = beside_or_below(layout, context, "Swap", MOBIUS_OT_use_selected.bl_label)
         row.operator(MOBIUS_OT_swap.bl_idname, text="Swap", icon="FILE_REFRESH")
         row.operator(MOBIUS_OT_use_selected.bl_idname, icon="RESTRICT_SELECT_OFF")
         _draw_picker(layout, context, "target")
@@ -67,8 +67,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     icon = {True: "CHECKMARK", False: "ERROR", None: "QUESTION"}[line.is_disc]
     row = column.row(align=True)
     texts = row.column(align=True)
+    buttons = bool(line.selectable) + bool(line.edits)
     for number, text in enumerate(line.rows):
-        draw_wrapped(texts, context, text, "BLANK1" if number else icon)
+        draw_wrapped(texts, context, text, "BLANK1" if number else icon, buttons=buttons)
     if line.selectable:
         button = row.operator(MOBIUS_OT_check.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         button.object_name, button.edit = obj.name, True

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import stored_alignment
 
@@ -76,17 +77,22 @@ def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, senten
         draw_wrapped(layout, context, text, "BLANK1" if number else icon)
 
 
-def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str) -> None:
-    """Draw a sentence in as many rows as the region's width needs."""
-    # a letter of Blender's font is 6 pixels wide on average; tabs, margins and the icon take 80
-    letters = max(16, int((_width(context) - 80) / 6.2))
+def draw_wrapped(
+    layout: bpy.types.UILayout, context: bpy.types.Context, sentence: str, icon: str, *, buttons: int = 0
+) -> None:
+    """Draw a sentence in as many rows as the region's width needs, where so many icons are buttons beside it."""
+    # a letter of Blender's font is 6 pixels wide on average; tabs, margins and the icon take 80, a button 20
+    letters = max(16, int((_width(context) - 80 - 20 * buttons) / 6.2))
     for number, row in enumerate(textwrap.wrap(sentence, letters)):
         layout.label(text=row, icon="BLANK1" if number else icon, translate=False)
 
 
-def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
-    """Return a row for two buttons or, in a narrow sidebar, a column."""
-    return layout.row(align=True) if _width(context) >= 260 else layout.column(align=True)
+def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context, *labels: str) -> bpy.types.UILayout:
+    """Return a row for two buttons with icons or, where their labels would be cut off, a column."""
+    # as in `draw_wrapped`: tabs and margins take 60, an icon with its margins 26
+    letters = int(((_width(context) - 60) / 2 - 26) / 6.2)
+    fits = all(len(iface_(label, "Operator")) <= letters for label in labels)
+    return layout.row(align=True) if fits else layout.column(align=True)
 
 
 def _width(context: bpy.types.Context) -> float:

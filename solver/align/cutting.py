@@ -52,18 +52,19 @@ def fitting_pieces(
     MeshError
         A surface cannot be used as a whole, and has no piece that fits.
     """
-    closed = all((surface.cleaned.mesh.twins >= 0).all() for surface in (source, target))
+    if all(_is_closed(surface) for surface in (source, target)):
+        if not settings.cut or all(_goes_to_sphere(surface) for surface in (source, target)):
+            return source, target, ()
+        return like_pieces(source, target, settings, clock) or (source, target, ())  # the sphere says why not
     clock.begin("flatten source", "Flattening the source", 0.0)
-    first = _why_not_whole(source) if closed else _why_cut(source)
-    if closed and first is None:
-        return source, target, ()  # the sphere takes both, or says why not
+    first = _why_cut(source)
     clock.begin("flatten target", "Flattening the target", 0.3)
-    second = _why_not_whole(target) if closed else _why_cut(target)
-    rest = clock.part(0.6, 1.0, "cut")
-    if not settings.cut or (second is None and (closed or first is None)):
+    second = _why_cut(target)
+    if not settings.cut or (first is None) == (
+        second is None
+    ):  # neither, or none that tells which piece of the other is shown
         return source, target, ()
-    if first is not None and second is not None:
-        return _like_pieces(source, target, (first, second), settings, rest)
+    rest = clock.part(0.6, 1.0, "cut")
     if first is not None:
         found, said = _piece_like(source, target, first, settings, rest, is_source=True)
         return found or source, target, said
@@ -73,7 +74,7 @@ def fitting_pieces(
 
 def _why_cut(surface: Surface) -> str | None:
     """Return why a disc cannot carry the surface as a whole, as the rest of a sentence; None if it can."""
-    if (surface.cleaned.mesh.twins >= 0).all():
+    if _is_closed(surface):
         return CLOSED
     try:
         share = shrunk(surface.flattening)
@@ -85,13 +86,15 @@ def _why_cut(surface: Surface) -> str | None:
     return None
 
 
-def _why_not_whole(surface: Surface) -> str | None:
-    """Return why a closed surface does not go to the sphere, as the rest of a sentence; None if it does."""
+def _is_closed(surface: Surface) -> bool:
+    return bool((surface.cleaned.mesh.twins >= 0).all())
+
+
+def _goes_to_sphere(surface: Surface) -> bool:
     try:
-        share = shrunk(surface.flattening)
+        return surface.flattening.domain.closed
     except MeshError:
-        return "juts out too far for a sphere"
-    return f"is deep, {share:.0%} of it has hardly any room on a sphere" if share > MUCH else None
+        return False
 
 
 def shrunk(flattening: Flat) -> float:
@@ -145,42 +148,37 @@ def _piece_like(
     return best[1], (Remark("piece", said),)
 
 
-def _like_pieces(
-    source: Surface, target: Surface, reasons: tuple[str, str], settings: AlignSettings, clock: Part
-) -> tuple[Surface, Surface, tuple[Remark, ...]]:
-    """Return those pieces of two surfaces, neither of which goes anywhere whole, that are told in most detail and fit.
+def like_pieces(
+    source: Surface, target: Surface, settings: AlignSettings, clock: Part
+) -> tuple[Surface, Surface, tuple[Remark, ...]] | None:
+    """Return those pieces of two surfaces too deep to go whole that have most vertices and fit, and what is to be said.
 
-    Of bodies that people model this is the head. The surfaces themselves where no two pieces fit.
+    Of bodies that people model this is the head. None where no two pieces fit.
     """
     clock.begin("cut", "Looking where to cut", 0.0)
     ours, theirs = (necks(surface.cleaned.mesh) for surface in (source, target))
-    ours = sorted(ours, key=lambda neck: -int(neck.beyond.sum()))[:TRIED]
-    for number, neck in enumerate(ours):
+    for number, neck in enumerate(sorted(ours, key=lambda neck: -int(neck.beyond.sum()))[:TRIED]):
         mine = source.piece(neck.beyond, _cut(neck))
         if _why_cut(mine) is not None:
             continue
         stage = clock.part(0.1 + 0.9 * number / TRIED, 0.1 + 0.9 * (number + 1) / TRIED)
-        alike = sorted(
-            theirs, key=lambda other: _shape_difference(mine.cleaned.mesh, _submesh(target.cleaned.mesh, other))
-        )
+        own, mesh = mine.cleaned.mesh, target.cleaned.mesh
+        alike = [(_shape_difference(own, _submesh(mesh, other)), k) for k, other in enumerate(theirs)]
         best: tuple[tuple[bool, float], Surface, Neck] | None = None
-        for place, other in enumerate(alike[:TRIED]):
+        for place, (_, k) in enumerate(sorted(alike)[:TRIED]):
+            yours = target.piece(theirs[k].beyond, _cut(theirs[k]))
             part = stage.part(place / TRIED, (place + 1) / TRIED)
-            yours = target.piece(other.beyond, _cut(other))
             fit = _fit(mine, yours, settings, part) if _why_cut(yours) is None else None
             if fit is not None and (best is None or fit < best[0]):
-                best = fit, yours, other
+                best = fit, yours, theirs[k]
         if best is not None:
-            said = tuple(
-                Remark(
-                    "piece",
-                    f"'{surface.original.name}' {reason}: of its pieces that fit the other the one with most vertices "
-                    f"was taken, {own.length:.3g} around where it was cut; for another one name a vertex group",
-                )
-                for surface, reason, own in ((source, reasons[0], neck), (target, reasons[1], best[2]))
+            said = (
+                f"'{source.original.name}' and '{target.original.name}' jut out too far to be aligned whole: of the "
+                f"pieces that fit each other those with most vertices are, {neck.length:.3g} and {best[2].length:.3g} "
+                "around where they were cut; for others name vertex groups"
             )
-            return mine, best[1], said
-    return source, target, ()
+            return mine, best[1], (Remark("piece", said),)
+    return None
 
 
 def _cut(neck: Neck) -> str:

@@ -18,8 +18,8 @@ DEEPEST = 0.01
 """Share of the area that is the end of what is deep: of a tube of 16 radii the last sixth of a radius."""
 
 SAME_END = 0.1
-"""Hyperbolic distance, as |x - y| / |1 - x conj(y)|, up to which two ends may be one: two radii from the end of a tube
-still lie within it, and hands of a body farther from each other."""
+"""Hyperbolic distance, as |x - y| / |1 - x conj(y)|, up to which two ends may be one: what lies deeper than two radii
+in one tube is nearer together, since exp(-2.3) is a tenth."""
 
 
 def end_to_end(mobius: Mobius, source: Flattening, target: Flattening) -> Mobius | None:

@@ -128,7 +128,8 @@ def unproved(found: SearchResult) -> list[Remark]:
     if found.certified or isinstance(found, SphereSearchResult):  # which says itself what it has proved
         return []
     share = 100 * found.gap / max(found.upper_bound, 1e-300)
-    said = f"not proved optimal: a value up to {share:.1f} % larger was not excluded in the time given"
+    given = "in the time given" if found.out_of_time else "with the work given"
+    said = f"not proved optimal: a value up to {share:.1f} % larger was not excluded {given}"
     return [Remark("unproved", said)]
 
 
@@ -149,6 +150,7 @@ def rival_of(found: Alignment, known: list[Any], enough: float | None, clock: Pa
         at_least=LOOKED_AT if _thorough(found.settings) else 0,
         time_limit=found.settings.time_limit,
         threads=found.settings.threads,
+        most_nodes=found.settings.most_nodes,
         progress=clock.searching(0.15),
     )
     if rival is None:
@@ -197,6 +199,7 @@ def _both_sides(
             margin=settings.reflect_margin * len(problem.source),
             time_limit=settings.time_limit,
             threads=settings.threads,
+            most_nodes=settings.most_nodes,
             progress=clock.searching(0.35),
         )
         if plain.cancelled:
@@ -219,6 +222,7 @@ def _both_sides(
             z_max=settings.z_max,
             time_limit=settings.time_limit,
             threads=settings.threads,
+            most_nodes=settings.most_nodes,
             progress=clock.searching(0.35 / len(sides)),
         )
         if result.cancelled:

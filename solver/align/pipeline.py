@@ -12,7 +12,7 @@ from ..surface.mesh import MeshError, TriangleMesh
 from .alignment import Alignment
 from .completing import completed
 from .confidence import BOUND
-from .cutting import fitting_pieces
+from .cutting import fitting_pieces, like_pieces
 from .dense import bent_densely, drafted_from
 from .diagnosis import causes, coarse, deep
 from .inside_out import turned_round
@@ -154,6 +154,12 @@ def _of_main_parts(
             found, source, target = rim
         elif not settings.take_rival and pairs is None:  # these decide
             found = reconsidered(found, matched, first, clock.part(0.97, 1))
+            if found.mean_confidence <= DOUBTFUL and settings.cut and all(map(deep, (source, target))):
+                again = like_pieces(source, target, settings, clock.part(0.97, 0.98))
+                if again is not None:
+                    cut, used = _of_main_parts(again[0], again[1], settings, clock.part(0.98, 1.0), None)
+                    if cut.mean_confidence > DOUBTFUL:
+                        return cut.annotated(remarks=(*joined, *again[2], *cut.remarks)), used
     return found.annotated(remarks=(*joined, *said, *found.remarks)), (source, target)
 
 

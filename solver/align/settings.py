@@ -37,6 +37,8 @@ class AlignSettings:
         Continue with the best rival in place of the winner, where the winner is the wrong one of an ambiguous pair.
     time_limit : float, optional
         Seconds for each search.
+    most_nodes : int, optional
+        Cells for each search: a limit that gives the same on every machine, however busy it is.
     thorough : bool
         Search the orientation that loses, and for a rival, beyond what decides whether they come within
         `reflect_margin`: then their values are the best there are. Dense refinement, which may go on with one of them,
@@ -68,6 +70,7 @@ class AlignSettings:
     reflect_margin: float = 0.06
     take_rival: bool = False
     time_limit: float | None = 60.0
+    most_nodes: int | None = None
     thorough: bool = True
     threads: int | None = None
     refine: str = "dense"
@@ -95,6 +98,8 @@ class AlignSettings:
             raise ValueError(f"radius must lie between 0 and 1, not {self.radius}")
         if self.time_limit is not None and not self.time_limit >= 0:
             raise ValueError(f"time_limit must be a number of seconds, not {self.time_limit}")
+        if self.most_nodes is not None and self.most_nodes < 1:
+            raise ValueError(f"most_nodes must be at least 1, not {self.most_nodes}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, not {self.threads}")
         if not 0 < self.compatible <= 1:

@@ -66,7 +66,7 @@ def _side(
         time_limit=settings.time_limit,
         progress=clock.searching(0.15),
         gap=GAP,
-        most_nodes=MOST_CELLS,
+        most_nodes=min(MOST_CELLS, settings.most_nodes or MOST_CELLS),
     )
     if found.cancelled:
         raise Cancelled

@@ -23,7 +23,7 @@ from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
 from .plate import NORMAL_WEIGHT, relaxed
-from .pose import FEW, NEARLY, in_pose, misfit, rigidly
+from .pose import in_pose, misfit, rigidly
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold import injective
 from .unfold_sphere import injective_on_sphere
@@ -195,19 +195,16 @@ def _best_start(
     unbent, above all where the images err. In the images' scale, `growth`, or in that in which the areas are the same.
     The one is taken that lies on the source best (`misfit`).
     """
-    ways = []
+    best, least = None, np.inf
     for scale in (growth, same_area):
         scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
         for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
-            rest = TriangleMesh(in_pose(TriangleMesh(way, flat.faces), onto, most=FEW), flat.faces)
-            ways.append((misfit(rest, onto), scaled, way, scale))
-    nearest = min(apart for apart, *_ in ways)
-    settled = []
-    for apart, scaled, way, scale in ways:
-        if apart <= NEARLY * nearest:
             rest = in_pose(TriangleMesh(way, flat.faces), onto)
-            settled.append((misfit(TriangleMesh(rest, flat.faces), onto), scaled, rest, scale))
-    return min(settled, key=lambda one: one[0])[1:]
+            apart = misfit(TriangleMesh(rest, flat.faces), onto)
+            if best is None or apart < least:
+                best, least = (scaled, rest, scale), apart
+    assert best is not None
+    return best
 
 
 def finished(

@@ -17,13 +17,6 @@ POSE_ROUNDS = 30
 POSE_SETTLED = 1e-3
 """Length, in roots of the source's area, that a round moves points by when the pose has settled."""
 
-FEW = 400
-"""Vertices, about, by which poses are found that are only compared: six numbers need no more."""
-
-NEARLY = 1.05
-"""Factor by which such a pose may lie worse than the best one and still be the best by all vertices: 1.03 at most, and
-once 1.09 in a draft of a wrong map, in 52 drafts of 15 pairs."""
-
 HELD = 0.01
 """What resists a move of the pose, as a share of springs on everything: where hardly anything is pulled, it stays."""
 

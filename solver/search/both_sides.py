@@ -27,6 +27,7 @@ def search_both(
     time_limit: float | None = None,
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
+    most_nodes: int | None = None,
 ) -> tuple[SearchResult, SearchResult]:
     """Return the outcomes of a search on the source and of one on the conjugated source.
 
@@ -37,7 +38,7 @@ def search_both(
     ----------
     objective : Objective
         Of discs.
-    z_max, threads, progress
+    z_max, threads, progress, most_nodes
         As for `search`.
     margin : float
         In the unit of Q.
@@ -51,7 +52,9 @@ def search_both(
     """
     started = time.perf_counter()
     deadline = None if time_limit is None else started + 2 * time_limit
-    states = [Search(float(z_max), float(len(objective.source)), lambda value, bound, nodes: False) for _ in range(2)]
+    most = np.inf if most_nodes is None else most_nodes
+    limit = float(len(objective.source))
+    states = [Search(float(z_max), limit, lambda value, bound, nodes: nodes >= most) for _ in range(2)]
     halt = states[1].halt = states[0].halt
 
     def work() -> None:

@@ -66,6 +66,7 @@ def search(
     gap: float = 0.0,
     enough: float | None = None,
     at_least: int = 0,
+    most_nodes: int | None = None,
 ) -> SearchResult:
     """Find the Möbius transformation that brings the greatest weight of source points into match discs of the target.
 
@@ -100,6 +101,8 @@ def search(
         The search ends as soon as it is decided whether some transformation reaches this value.
     at_least : int
         Cells whose bound is computed before `enough` or `gap` ends the search: what is small is finished.
+    most_nodes : int, optional
+        Cells, about, after which the search ends: a limit that finds the same on every machine.
 
     Returns
     -------
@@ -134,6 +137,8 @@ def search(
     started = time.perf_counter()
 
     def until(value: float, bound: float, nodes: int) -> bool:
+        if most_nodes is not None and nodes >= most_nodes:
+            return True
         decided = enough is not None and (value >= enough or bound < enough)
         return nodes >= at_least and (decided or (gap > 0 and bound <= value * (1 + gap)))
 

@@ -58,6 +58,7 @@ def best_rival(
     time_limit: float | None,
     threads: int | None = None,
     progress: Callable[[SearchProgress], bool | None] | None = None,
+    most_nodes: int | None = None,
 ) -> Rival | None:
     """Search again without the pairs that known transformations bring near each other; None if cancelled.
 
@@ -66,7 +67,7 @@ def best_rival(
     objective : Objective
     known : sequence of Mobius
         All reflected, or none: the winner of a search, and rivals found before.
-    z_max, time_limit, threads, progress :
+    z_max, time_limit, threads, progress, most_nodes :
         As for `search`.
     enough : float, optional
         The search ends as soon as it is decided whether a rival has this Q, and `at_least` cells have been looked at.
@@ -87,6 +88,7 @@ def best_rival(
         progress=progress,
         enough=enough,
         at_least=at_least,
+        most_nodes=most_nodes,
     )
     if found.cancelled:
         return None

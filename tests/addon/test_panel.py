@@ -411,8 +411,15 @@ def test_the_selection_is_used_from_active_to_selected(pair: tuple[Any, Any]) ->
     bpy.context.view_layer.objects.active = source
     assert bpy.ops.mobius.use_selected() == {"FINISHED"}
     assert (settings.source, settings.target) == (source, target)
-    target.select_set(False)
-    with pytest.raises(RuntimeError, match="Select two meshes, the source last"):
+    other = make_sheet("Another", 3)
+    for obj in (*pair, other):  # adding one may have selected it alone
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = source
+    assert bpy.ops.mobius.use_selected() == {"FINISHED"}
+    assert (settings.source, settings.target) == (source, min(other, target, key=lambda obj: obj.name))
+    for obj in (other, target):
+        obj.select_set(False)
+    with pytest.raises(RuntimeError, match="Select the target, or several, and the source last"):
         bpy.ops.mobius.use_selected()
 
 

@@ -244,6 +244,7 @@ def faces_without_area(old: Damaged, rng: np.random.Generator) -> Damaged:
     """Faces folded flat onto one of their edges: two on each other beside it."""
     mesh, n = old.mesh, len(old.mesh.vertices)
     inner = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
+    inner = inner[mesh.face_areas[inner // 3] > 0]  # others have no side on which a wall could stand
     if not inner.size:
         return old
     side = int(rng.choice(inner))
@@ -267,6 +268,7 @@ def inner_faces(old: Damaged, rng: np.random.Generator) -> Damaged:
     """A wall that stands on inner edges."""
     mesh, n = old.mesh, len(old.mesh.vertices)
     inner = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
+    inner = inner[mesh.face_areas[inner // 3] > 0]  # others have no side on which a wall could stand
     if not inner.size:
         return old
     side = int(rng.choice(inner))

@@ -5,6 +5,7 @@ The heads are those of `MOBIUS_DATA`. `bpy`, `PACKAGE`, `region`, `click` and `s
 
 import importlib
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,12 @@ from mathutils import Euler
 
 vars(hand).update(region=region, click=click, shot=shot)
 Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
-Play = importlib.import_module(PACKAGE + ".mobius_addon.playing").Play
+playing = importlib.import_module(PACKAGE + ".mobius_addon.playing")
+Play, strength_at = playing.Play, playing.strength_at
 panels = importlib.import_module(PACKAGE + ".mobius_addon.panel")
+
+STRONG = 0.6
+"""Of an expression's full strength, at which a picture is taken."""
 
 HEADS = Path(os.environ["MOBIUS_DATA"]) / "heads"
 
@@ -40,7 +45,8 @@ def steps() -> Wait:
     yield from picture("expressions-aligned", 3.0)
     yield from click_on((yield from find("bpy.ops.mobius.transfer", upwards=True)))
     yield from until(lambda: Job.current is None and target.data.shape_keys is not None)
-    bpy.utils.unregister_class(panels.MOBIUS_PT_transfer)  # so that the sidebar need not be scrolled
+    for folded in (panels.MOBIUS_PT_proof, panels.MOBIUS_PT_notes, panels.MOBIUS_PT_parts, panels.MOBIUS_PT_pairs):
+        bpy.utils.unregister_class(folded)  # so that the sidebar need not be scrolled
     yield 2.0
     keys = target.data.shape_keys.key_blocks
     keys[3].value = 0.25  # of the person's own
@@ -50,13 +56,10 @@ def steps() -> Wait:
     yield from click_on(button)
     yield from until(lambda: Play.current is not None)
     for number, name in enumerate(("jawOpen", "mouthSmileLeft")):
-        wanted = next(k for k, (own, _) in enumerate(Play.current.names) if own == name)
-        while Play.current.number != wanted:
-            pointer("key", "Right" if Play.current.number < wanted else "Left")
-            yield 0.3
-        shown = bpy.data.objects[names[1]].data.shape_keys.key_blocks[name]
-        yield from until(lambda shown=shown: shown.value > 0.95, 0.02)
-        assert bpy.data.objects[names[0]].data.shape_keys.key_blocks[name].value > 0.5, "the source does not go along"
+        yield from go_to(name)
+        shown = [values(names)[one, name] for one in names]
+        print(f"[clicks] {name}: {shown}", flush=True)
+        assert shown[0] == shown[1] > STRONG, "the source does not go along"
         yield from picture(f"expressions-{number}", 0.05)
     place = region("WINDOW")
     x, y = place.x + place.width // 3, screen_height() - place.y - place.height // 2
@@ -79,6 +82,19 @@ def steps() -> Wait:
     yield from until(lambda: bpy.data.objects[names[1]].data.shape_keys is not None)
     assert set(values(names)) == set(before[0])
     print("[clicks] done", flush=True)
+
+
+def go_to(name: str) -> Wait:
+    """Go to an expression with the arrows, and wait until it is strong."""
+    wanted = next(number for number, (own, _) in enumerate(Play.current.names) if own == name)
+    end = time.monotonic() + 120
+    while not (Play.current.number == wanted and strength_at(Play.current.place - wanted) > STRONG):
+        assert time.monotonic() < end, f"{name} was not to be seen"
+        if (now := Play.current.number) != wanted:
+            pointer("key", "Right" if now < wanted else "Left")
+            yield from until(lambda now=now: Play.current is None or Play.current.number != now, 0.02)
+        else:
+            yield 0.02
 
 
 def values(names: tuple[str, str]) -> dict[tuple[str, str], float]:

@@ -14,14 +14,11 @@ vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
 Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
 
-LEVELS = 2
-"""Times that the faces of the demo's heads are cut in four."""
+FACES = 100_000
+"""Triangles that the demo's heads are brought to."""
 
 SLOWEST = 1.5
 """Times the processor's work for drawing the window that it may take once 100,000 faces are chosen, by software."""
-
-STILL = 2.0
-"""Seconds that the window may stand still while it is computed, on a busy machine that draws by software."""
 
 
 def steps() -> Wait:
@@ -66,13 +63,16 @@ def steps() -> Wait:
 
 
 def refine(obj: bpy.types.Object) -> None:
-    """Cut each face of an object into four and again, with all that is on it but its shape keys."""
-    modifier = obj.modifiers.new("Finer", "SUBSURF")
-    modifier.subdivision_type, modifier.levels = "SIMPLE", LEVELS
+    """Bring an object to so many triangles, with all that is on it but its shape keys."""
     bpy.context.view_layer.objects.active = obj
     if obj.data.shape_keys is not None:
         obj.shape_key_clear()
-    bpy.ops.object.modifier_apply(modifier=modifier.name)
+    finer = obj.modifiers.new("Finer", "SUBSURF")
+    finer.subdivision_type, finer.levels = "SIMPLE", 2
+    bpy.ops.object.modifier_apply(modifier=finer.name)
+    coarser = obj.modifiers.new("Coarser", "DECIMATE")
+    coarser.ratio = FACES / (2 * len(obj.data.polygons))
+    bpy.ops.object.modifier_apply(modifier=coarser.name)
 
 
 def finished(what: str, done: object, name: str) -> Wait:

@@ -119,3 +119,45 @@ def test_a_file_for_one_mesh_is_refused_before_any_work(folder: Path, capsys: py
     assert main(given) == 1
     assert "can hold one mesh and not 2: write one of .blend .obj .glb" in capsys.readouterr().err
     assert not (folder / "out.ply").exists()
+
+
+def test_one_rig_moves_all(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "source.blend"))
+    bpy.ops.object.armature_add()
+    armature = bpy.context.active_object
+    armature.data.bones[0].name = "Jaw"
+    for name in ("Source", "Source Eye"):
+        bpy.data.objects[name].modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "source.blend"))
+    given = [str(folder / "source.blend"), str(folder / "target.blend"), "-o", str(folder / "out.blend")]
+    flags = [*QUICK, "--only", "vertex-groups", "--rig", "--map", str(folder / "map.npz")]
+    assert main(["transfer", *given, *flags]) == 0
+    assert "otherwise: those of 'Target', 'Target Eye' one after another" in capsys.readouterr().err
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "out.blend"))
+    movers = {
+        modifier.object
+        for name in ("Target", "Target Eye")
+        for modifier in bpy.data.objects[name].modifiers
+        if modifier.type == "ARMATURE"
+    }
+    assert [x.type for x in bpy.data.objects].count("ARMATURE") == 1
+    assert [x.data.bones.keys() for x in movers] == [["Jaw"]]
+
+
+def test_what_was_carried_before_is_replaced(folder: Path) -> None:
+    source, out = folder / "source.blend", folder / "out.blend"
+    flags = [*QUICK, "--only", "vertex-groups"]
+    assert main(["transfer", str(source), str(folder / "target.blend"), "-o", str(out), *flags]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(source))
+    bpy.data.objects["Source"].vertex_groups["Jaw"].add(range(300), 0.7, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    assert main(["transfer", str(source), str(out), "-o", str(out), "--overwrite", *flags]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    assert bpy.data.objects["Target"].vertex_groups.keys() == ["Jaw"]
+    assert weights(bpy.data.objects["Target"], "Jaw").max() == pytest.approx(0.7)
+
+
+def test_textures_need_one_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [str(folder / "source.blend"), str(folder / "target.blend"), "-o", str(folder / "out.blend")]
+    assert main(["transfer", *given, "--only", "textures"]) == 1
+    assert "has 2 mesh objects, and --only textures takes one: name it as" in capsys.readouterr().err

@@ -22,11 +22,12 @@ from solver import (
     report,
     save_surface,
 )
-from solver.align.cutting import MUCH, shrunk
+from solver.align.cutting import MUCH, like_pieces, shrunk
 from solver.align.diagnosis import deep
 from solver.align.judgement import judge
 from solver.align.prepared import Surface
 from solver.flatten.flatten import flatten
+from solver.stages import Stages
 
 SMALL = AlignSettings(samples=60, targets=400, reflect="never")
 
@@ -120,6 +121,18 @@ def test_two_people_are_called_too_deep_and_their_heads_are_aligned(data_path: C
     found = correspond(alignment)
     errors = percent(places(found, woman)[found.matched], woman.vertices[found.matched], alignment.source.mesh)
     assert errors.mean() < 3
+
+
+def test_of_two_bodies_pieces_that_fit_are_cut_out() -> None:
+    """Neither tells which piece of the other is shown: those with most vertices that fit are taken."""
+    one, two = snowman(40, 30, seed=3), posed(snowman(36, 28, seed=3), 4)
+    surfaces = (Surface(body, fill_holes=True, largest_part=True) for body in (one, two))
+    found = like_pieces(*surfaces, replace(SMALL, samples=40, targets=200), Stages(None).part(0, 1))
+    assert found is not None
+    source, target, (said,) = found
+    assert 0.1 < source.cleaned.share < 0.9
+    assert abs(source.cleaned.share - target.cleaned.share) < 0.02
+    assert said.text.startswith("'Body' and 'Body' jut out too far to be aligned whole")
 
 
 def test_a_head_goes_to_one_disc(pair: tuple[TriangleMesh, TriangleMesh, np.ndarray]) -> None:

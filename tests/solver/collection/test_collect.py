@@ -1,5 +1,6 @@
 """Collections, done by threads and by processes: nothing twice, what fails is named, and what is killed goes on."""
 
+import importlib
 import json
 import os
 import signal
@@ -8,6 +9,8 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +20,10 @@ from solver import AlignSettings, MeshError, TriangleMesh, load_map
 from solver.collection import Plan, Specimen, Told, collect, processes
 from solver.collection.engine import AHEAD, completed
 from solver.collection.tasks import Compare
+from solver.collection.work import Work
 from solver.collection.worker import Elsewhere
 
+collecting = importlib.import_module("solver.collection.collect")  # `solver.collection.collect` is the function
 ROOT = Path(__file__).resolve().parents[3]
 ROUGH = AlignSettings(refine="mobius", samples=40, targets=200)
 DENSE = AlignSettings(samples=40, targets=200)
@@ -100,6 +105,42 @@ def test_a_star_and_a_tree_have_dense_maps(family: Family, tmp_path: Path) -> No
     tree.folder.dense_map(source, target).unlink()
     _, tasks = counted(specimens, tmp_path / "b", settings=DENSE, plan=Plan("tree"))
     assert len(tasks) == 1
+
+
+def test_paths_are_laid_anew_round_dense_maps_that_turn_out_suspect(
+    family: Family, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The dense maps here are Möbius maps that say they are dense, and the first of them is said to be wrong."""
+    aligned, stages, wrong = Work.aligned, [], []
+
+    def dense(work, stage, names, edges, settings):
+        stages.append((stage, len(edges)))
+        found = aligned(work, stage, names, edges, ROUGH)
+        return {edge: replace(known, dense=stage == "dense maps") for edge, known in found.items()}
+
+    def accusing(folder, names, found, edges, settings):
+        wrong[:] = wrong or [edge for edge in edges if found[edge].dense][:1]
+        return np.array([float(edge in wrong) for edge in edges]), (np.zeros((0, 3), int), np.zeros(0))
+
+    monkeypatch.setattr(Work, "aligned", dense)
+    monkeypatch.setattr(collecting, "_checked", accusing)
+    found, _ = counted(family(3), tmp_path, settings=DENSE, plan=Plan("tree"))
+    assert stages == [("pairs", 3), ("dense maps", 2), ("dense maps", 1)]
+    # of three maps two were enough at first; the third replaces the one that is wrong, and is as dense as they are
+    assert [known.dense for known in found.figures] == [True] * 3
+    assert found.suspects.tolist() == [edge in wrong for edge in found.edges]
+    walked = {(min(a, b), max(a, b)) for path in found.routes.values() for a, b in pairwise(path)}
+    assert walked == {edge for edge, bad in zip(found.edges, found.suspects, strict=True) if not bad}
+
+
+def test_searches_end_by_cells_not_by_the_clock(family: Family, tmp_path: Path) -> None:
+    hurried = AlignSettings(refine="mobius", samples=40, targets=200, time_limit=0.0)
+    found, _ = counted(family(2), tmp_path / "a", settings=hurried)
+    assert found.figures[0].certified
+    found, _ = counted(family(2), tmp_path / "b", settings=replace(hurried, most_nodes=1))
+    assert not found.figures[0].certified
+    assert found.figures[0].upper_bound > found.figures[0].value
+    assert "with the work given" in " ".join(found.figures[0].warnings)
 
 
 def test_what_fails_is_named_and_the_others_go_on(family: Family, tmp_path: Path) -> None:
