@@ -116,9 +116,7 @@ def run(count: int, size: int, plan: Plan, refine: str, out: Path, opened: Open,
 
 
 def growth(counts: list[int], size: int, root: Path) -> None:
-    print(
-        "| plan | specimens | pairs | wall s | s per pair | dense | MB on disk | kB each | MB here | MB per worker |"
-    )
+    print("| plan | specimens | pairs | wall s | s per pair | dense | MB on disk | kB each | MB here | MB per worker |")
     print("|" + 10 * "---|")
     for count in counts:
         shutil.rmtree(root / str(count), ignore_errors=True)
