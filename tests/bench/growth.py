@@ -116,8 +116,8 @@ def run(count: int, size: int, plan: Plan, refine: str, out: Path, opened: Open,
 
 
 def growth(counts: list[int], size: int, root: Path) -> None:
-    print("| plan | specimens | pairs | wall s | s per pair | MB on disk | kB per pair | MB here | MB per worker |")
-    print("|" + 9 * "---|")
+    print("| plan | specimens | pairs | wall s | s per pair | dense | MB on disk | kB each | MB here | MB per worker |")
+    print("|" + 10 * "---|")
     for count in counts:
         shutil.rmtree(root / str(count), ignore_errors=True)
         # in one folder: of the tree the dense maps alone are new
@@ -132,8 +132,10 @@ def growth(counts: list[int], size: int, root: Path) -> None:
             found = run(count, size, plan, refine, root / str(count), processes(WORKERS), memory)
             wall, pairs = time.perf_counter() - begun, len(found.edges)
             lines, each = (found.folder.root / "pairs.jsonl").stat().st_size / 1024, [x.seconds for x in found.figures]
+            dense = [x.seconds for x in found.figures if x.dense]
+            bent = f"{np.median(dense):.3f} of {len(dense)}" if dense else ""
             print(
-                f"| {plan.pairs}, {refine} | {count} | {pairs:,} | {wall:.0f} | {np.median(each):.3f} | "
+                f"| {plan.pairs}, {refine} | {count} | {pairs:,} | {wall:.0f} | {np.median(each):.3f} | {bent} | "
                 f"{on_disk(found.folder.root):.1f} | {lines / pairs:.1f} | {memory.most('here'):.0f} | "
                 f"{memory.most('worker'):.0f} |",
                 flush=True,
