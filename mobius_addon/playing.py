@@ -17,6 +17,9 @@ SECONDS = 0.9
 RISE = 0.35
 """Share of this in which it comes, and as much in which it goes."""
 
+LONGEST = 0.25
+"""Share of its time from one picture to the next at most: less than it stays at full strength, for slow windows."""
+
 
 @dataclass(frozen=True)
 class _Before:
@@ -66,7 +69,7 @@ class Play:
 
     def go_on(self, seconds: float) -> bool:
         """Show what is to be seen some seconds later; return whether there is anything to come."""
-        self.place += seconds / SECONDS
+        self.place += min(seconds / SECONDS, LONGEST)
         return self._show()
 
     def step(self, by: int) -> bool:

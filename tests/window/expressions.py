@@ -55,7 +55,7 @@ def steps() -> Wait:
     button = yield from find("bpy.ops.mobius.try_expressions")
     yield from click_on(button)
     yield from until(lambda: Play.current is not None)
-    for number, name in enumerate(("jawOpen", "mouthSmileLeft")):
+    for number, name in enumerate(("browInnerUp", "jawOpen")):
         yield from go_to(name)
         shown = [values(names)[one, name] for one in names]
         print(f"[clicks] {name}: {shown}", flush=True)

@@ -35,6 +35,9 @@ def steps() -> Wait:
     names = source.name, target.name
     for folded in (panels.MOBIUS_PT_pictures, panels.MOBIUS_PT_transfer):
         bpy.utils.unregister_class(folded)  # so that the sidebar need not be scrolled
+    bpy.utils.unregister_class(panels.MOBIUS_PT_pairs)
+    panels.MOBIUS_PT_pairs.bl_options = set()  # unfolded: the guide shows it
+    bpy.utils.register_class(panels.MOBIUS_PT_pairs)
     yield 1.0
     before = bytes(target.data.mobius_alignment.packed)
 
