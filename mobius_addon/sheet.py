@@ -66,16 +66,19 @@ def render_sheet(
             rest = surface.rest.vertices
             moved = [np.sum([key_displacement(obj, x[row]) for x in together(names, keys)], axis=0) for names in chosen]
             shapes = [rest] + [rest + mirrored(obj, values) for values in moved]
+            every = bpy.data.meshes.new("Studio")
+            every.from_pydata(np.concatenate(shapes).tolist(), [], [])
             for column, shape in enumerate(shapes):
                 corner = np.array([left + _WIDTH * column, top - _HEIGHT * (row + 1)])
                 frame = np.array([corner + 0.05, corner + np.array([_WIDTH, _HEIGHT]) - 0.05], dtype=np.float64)
                 mesh = bpy.data.meshes.new("Studio")
                 mesh.from_pydata(rest.tolist(), [], surface.rest.faces.tolist())
-                place = fit(mesh, turn, frame)  # of the shape at rest, so that what stays is seen to stay
+                place = fit(every, turn, frame)  # of all of them, so that what stays is seen to stay
                 mesh.vertices.foreach_set("co", shape.astype(np.float32).ravel())
                 mesh.shade_smooth()
                 mesh.update()
                 put(scene, mesh, clay, place)
+            bpy.data.meshes.remove(every)
         for column, names in enumerate(chosen, 1):
             text = " + ".join(one[0] for one in together(names, keys))
             write(scene, text, (left + _WIDTH * (column + 0.5), 0.1 - top))

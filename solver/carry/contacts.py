@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
-from .gradients import GradientTransfer, parts_of
+from .gradients import GradientTransfer
 
 CLOSED = 0.3
 """Points meet that are left apart by less than this share of how far they were.
@@ -166,8 +166,7 @@ def brought_together(transfer: GradientTransfer, carried: Floats, moved: Floats)
     """
     if not moved.any():
         return carried
-    places, faces = transfer.target.vertices, transfer.target.faces
-    faces = faces[parts_of(transfer.target)[1] == 0]
+    places, faces = transfer.target.vertices, transfer.largest
     there = find_contacts(transfer.places, moved, faces)
     if len(there.vertex) == 0:
         return carried

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
@@ -117,6 +118,11 @@ class GradientTransfer:
         """Return displacements of the source's vertices, (n_source, 3), turned and scaled as the surface around."""
         moved = self._matrix @ displacements
         return np.einsum("nij,nj->ni", self.rotation, moved) * self.scale[:, None]
+
+    @cached_property
+    def largest(self) -> Integers:
+        """The triangles of the target's largest part, (k, 3)."""
+        return self.target.faces[parts_of(self.target)[1] == 0]
 
     def __call__(self, displacements: Floats) -> Floats:
         """Return displacements of target vertices, (n, 3), for some of source vertices, (n_source, 3).
