@@ -143,6 +143,7 @@ GERMAN_SENTENCES = {
     "{} edge": "{} Kante",
     "not proved optimal: time ran out before the rotations were searched to their end": "Nicht als beste bewiesen: Die Zeit war um, bevor alle Drehungen durchsucht waren",
     "'{}' is long and narrow: less exact, as angles are lost along {} of its rim": "„{}“ ist lang und schmal: weniger genau, da längs {} des Randes Winkel verloren gehen",
+    "'{}' and '{}' jut out too far to be aligned whole: of the pieces that fit each other those with most vertices are, {} and {} around where they were cut; for others name vertex groups": "„{}“ und „{}“ ragen zu weit heraus, um als Ganzes ausgerichtet zu werden: Von den Stücken, die zueinander passen, werden es die mit den meisten Punkten, mit {} und {} Umfang am Schnitt; für andere Vertexgruppen nennen",
     "'{}' juts out too far for a sphere: beside an open surface a piece that fits it is cut out": "„{}“ ragt für eine Kugel zu weit heraus: Neben einer offenen Fläche wird ein passendes Stück ausgeschnitten",
     "'{}' is too deep for one disc: a piece that fits the other surface is cut out, if it has one": "„{}“ ist zu tief für eine Scheibe: Ein Stück, das zur anderen Fläche passt, wird ausgeschnitten, wenn es eines hat",
 }

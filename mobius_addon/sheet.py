@@ -10,7 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..solver import Correspondence
+from ..solver.carry.fitted import is_reflected, similarity
 from ..solver.carry.frames import nearest_orthogonal
+from ..solver.carry.interpolate import places
 from ..solver.surface.mesh import Floats
 from .attributes.expression_names import understood
 from .demo.pictures import CLAY, cover, fit, fresh_tree, light, put, render, studio, write
@@ -59,7 +61,7 @@ def render_sheet(
         light(scene, energy=2.6, angle=0.5, rotation=(0.75, 0.15, 0.55))
         light(scene, energy=0.8, angle=1.0, rotation=(1.2, 0.0, -1.0))
         clay = _clay()
-        turns = _turns(pair[0], surfaces, correspondence)
+        turns = poses(pair[0], surfaces, correspondence)
         for row, (obj, surface, turn) in enumerate(zip(pair, surfaces, turns, strict=True)):
             rest = surface.rest.vertices
             moved = [np.sum([key_displacement(obj, x[row]) for x in together(names, keys)], axis=0) for names in chosen]
@@ -107,17 +109,22 @@ def key_displacement(obj: bpy.types.Object, name: str) -> Floats:
     return apart - foreach(key.relative_key.points, "co", 3, np.float32).astype(np.float64)
 
 
-def _turns(
+def poses(
     source: bpy.types.Object, surfaces: tuple[Surface, Surface], correspondence: Correspondence
 ) -> tuple[Rotation, Rotation]:
-    """Return how to hold both: the source as it is in the scene, the target as the source."""
+    """Return how to hold both: the source as it is in the scene, the target as that, or as its picture in a mirror."""
     axes: Floats = mirrored(source, np.array(source.matrix_world, dtype=np.float64)[:3, :3])
     own = nearest_orthogonal(axes[None])[0]
-    known = correspondence.face >= 0
-    here = (correspondence.matrix() @ surfaces[0].rest.vertices)[known]
-    there = surfaces[1].rest.vertices[known]
-    turn, _ = Rotation.align_vectors(here - here.mean(axis=0), there - there.mean(axis=0))
-    return Rotation.from_matrix(own), Rotation.from_matrix(own) * turn
+    rests = surfaces[0].rest, surfaces[1].rest
+    reflected = is_reflected(correspondence, *rests)
+    known = correspondence.matched
+    if not known.any():
+        return Rotation.from_matrix(own), Rotation.from_matrix(own)
+    here = places(correspondence, rests[0].vertices)[1][known]
+    turn = nearest_orthogonal(own[None] @ similarity(rests[1].vertices[known], here, None, reflected)[:3, :3])[0]
+    if reflected:  # as in a mirror beside it
+        turn = np.diag([-1.0, 1.0, 1.0]) @ turn
+    return Rotation.from_matrix(own), Rotation.from_matrix(turn)
 
 
 def _clay() -> bpy.types.Material:

@@ -6,6 +6,7 @@ import argparse
 
 from ..streams import DONE, NOT_ALIGNED, UNUSABLE, say, say_error
 from .mesh_options import MESH_HELP
+from .output_files import warn
 
 HELP = "Say what each mesh is, and what will be done about it."
 
@@ -54,6 +55,5 @@ def run(options: argparse.Namespace) -> int:
                 notes = together(found, path, wanted)[1]
             except Unreadable as error:
                 notes = [str(error)]
-            for note in notes:
-                say(note)
+            warn(notes)
     return status

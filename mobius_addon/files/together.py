@@ -19,6 +19,9 @@ _TWIN = 0.1
 Of the heads and bodies at hand the part most like the skin differs by 0.38, a tenth of a skin's vertices by 0.06.
 """
 
+_FLAT = 1e-3
+"""Shortest side of a box, in its diagonal, below which what is in it is a plane, up to what files round."""
+
 
 def together(meshes: list[Imported], path: Path, wanted: str | None) -> tuple[list[Imported], list[str]]:
     """Return the mesh that is named or, without a name, all that are one thing, the largest first, and what to say.
@@ -38,10 +41,15 @@ def together(meshes: list[Imported], path: Path, wanted: str | None) -> tuple[li
     shown = shown or [x for x in found if len(x.obj.data.polygons)] or found[:1]
     for imported in shown:
         require_places(imported)
-    areas = [_area(x) for x in shown]
-    main = int(np.argmax(areas))
     boxes = np.array([_box(x) for x in shown])
-    sizes = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
+    sides = boxes[:, 1] - boxes[:, 0]
+    sizes = np.linalg.norm(sides, axis=1)
+    areas = np.array([_area(x) for x in shown])
+    flat = sides.min(axis=1) < _FLAT * sizes
+    if not flat.all():  # a floor or a wall that is larger than the thing is none of its parts
+        kept = np.flatnonzero(~flat | (sizes < sizes[~flat].max()))
+        shown, boxes, sizes, areas = [shown[k] for k in kept], boxes[kept], sizes[kept], areas[kept]
+    main = int(np.argmax(areas))
     apart = np.abs(boxes - boxes[main]).max(axis=(1, 2))
     twins = [x for k, x in enumerate(shown) if k != main and apart[k] < _TWIN * sizes[main]]
     if twins:
@@ -52,13 +60,13 @@ def together(meshes: list[Imported], path: Path, wanted: str | None) -> tuple[li
         )
     meet = (boxes[:, None, 0] <= boxes[None, :, 1]).all(axis=2)
     _, group = connected_components(coo_array(meet & meet.T), directed=False)
-    taken = [k for k in np.argsort(-np.array(areas), kind="stable") if group[k] == group[main]]
+    taken = [k for k in np.argsort(-areas, kind="stable") if group[k] == group[main]]
     result = [shown[k] for k in taken]
     notes = []
     if len(result) > 1:
         notes.append(f"{len(result)} mesh objects of '{path}' count as one ({listed(result)})")
     if left := [x for x in found if x not in result]:
-        why = "hidden, without faces or apart from it"
+        why = f"hidden, without faces, a floor, or apart from '{result[0].name}'"
         notes.append(
             f"of '{path}' {listed(left)} {'is' if len(left) == 1 else 'are'} left out, {why}: name one as {path}:NAME"
         )

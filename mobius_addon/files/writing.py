@@ -69,13 +69,14 @@ def write_mesh(
     names = [one.name for one in objects]
     export_mesh(obj, path, real_place(final).parent, others)
     lost = [losses(x, y) for x, y in zip(before, _read_again(path, before, names), strict=True)]
-    if len(objects) > 1:
-        return [
-            f"'{name}' in '{final}' is without {x}: write a .blend to keep all"
-            for name, x in zip(names, lost, strict=True)
-            if x
-        ]
-    return [f"'{final}' is without {x}: write a .blend to keep all" for x in lost if x]
+    sharing: dict[str, list[str]] = {}
+    for name, x in zip(names, lost, strict=True):
+        sharing.setdefault(x, []).append(f"'{name}'")
+    said = []
+    for x, who in sharing.items():
+        whose = f"{', '.join(who)} in '{final}'" if len(objects) > 1 else f"'{final}'"
+        said += [f"{whose} {'is' if len(who) == 1 else 'are'} without {x}: write a .blend to keep all"] if x else []
+    return said
 
 
 def require_room(number: int, final: Path) -> None:

@@ -15,7 +15,7 @@ from ..surface.mesh import Booleans, Floats, Integers, MeshError
 from ..surface.tidy import Cleaned
 from .alignment import Alignment, Overlap
 from .confidence import SURE
-from .mobius_map import implied, improved, roughly_aligned, valued
+from .mobius_map import challenged, implied, improved, searched, valued
 from .overlap import Piece, shared
 from .prepared import Surface
 from .remark import Remark
@@ -57,11 +57,13 @@ def overlap_of(
             )
             for part in (source_part, target_part)
         )
-        inner = roughly_aligned(source, target, settings, clock.part(0.2, 0.5, "overlap"), pairs)
+        searching = clock.part(0.2, 0.5, "overlap")
+        inner = searched(source, target, settings, searching, pairs)
     except MeshError:  # too small a piece to flatten
         return None
     if not _surely_better(inner.matched_weights, found.matched_weights):
         return None
+    inner = challenged(inner, searching)
     face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
 

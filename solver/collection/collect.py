@@ -185,7 +185,7 @@ def _collected(work: Work, names: list[str], plan: Plan, settings: AlignSettings
     routes = _routes(plan, count, edges, costs, bad, root)
     if plan.pairs != "all" and settings.refine == "dense":
         dense: set[Edge] = set()
-        for _ in range(ROUNDS):
+        for left in reversed(range(ROUNDS)):
             steps = {(min(a, b), max(a, b)) for path in routes.values() for a, b in pairwise(path)} - dense
             if not steps:
                 break
@@ -193,7 +193,8 @@ def _collected(work: Work, names: list[str], plan: Plan, settings: AlignSettings
             dense |= steps
             errors, cycles = _checked(work.folder, names, found, edges, settings)
             bad = suspect(errors)
-            routes = _routes(plan, count, edges, costs, bad, root)
+            if left:  # the last paths stay: all their maps are dense
+                routes = _routes(plan, count, edges, costs, bad, root)
     return Collection(
         folder=work.folder,
         names=names,

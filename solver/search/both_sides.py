@@ -61,8 +61,9 @@ def search_both(
         plain = matching(
             objective.source, objective.target, objective.radius, weights=objective.weights, check=states[0].check
         )
-        for state, problem in zip(states, (plain, plain.reflected()), strict=True):
-            state.begin(problem, False)
+        states[0].begin(plain, False)
+        states[1].kernels = [states[0].kernels[0].reflected()]  # the same tables
+        states[1].begin(plain.reflected(), False)
         until = np.inf if deadline is None else deadline
         walks = [iter(state.rounds(until, threads or os.cpu_count() or 1)) for state in states]
         left = [0, 1]

@@ -98,7 +98,8 @@ def search(
         of the optimum, say, which is not `certified`, but as far as it goes proved. Weights that differ by little leave
         a last percent that takes most of the time.
     enough : float, optional
-        The search ends as soon as it is decided whether some transformation reaches this value.
+        The search ends as soon as it is decided whether some transformation reaches this value. Without `at_least`
+        nothing below it is looked for, so that `upper_bound` says no more than that none does.
     at_least : int
         Cells whose bound is computed before `enough` or `gap` ends the search: what is small is finished.
     most_nodes : int, optional
@@ -147,6 +148,8 @@ def search(
         state.run(np.inf if time_limit is None else started + time_limit, threads or os.cpu_count() or 1)
 
     state = Search(float(z_max), float(np.size(source)), until)
+    if enough is not None and at_least == 0:
+        state.floor = float(np.nextafter(enough, -np.inf))
     deadline = None if time_limit is None else started + time_limit
     tell = None if progress is None else lambda: progress(state.progress(time.perf_counter() - started))
     cancelled = watched(work, state.halt, deadline, tell)
@@ -232,11 +235,11 @@ class Search:
         return Mobius(best.z, best.theta)
 
     def begin(self, plain: Any, reflect: bool) -> None:
-        """Set up what the search needs."""
+        """Set up what the search needs; kernels that it has already are taken."""
         self.sides = [plain, plain.reflected()] if reflect else [plain]
         self.unlooked = plain.limit
         self.value, self.matches = plain.evaluated(self.best, self.check)
-        self.kernels = [kernels_for(plain, self.z_max, SMALLEST_CELL, self.halt)]
+        self.kernels = self.kernels or [kernels_for(plain, self.z_max, SMALLEST_CELL, self.halt)]
         if reflect:
             self.kernels.append(self.kernels[0].reflected())
         self.frontier = [whole_disc(problem.limit) for problem in self.sides]

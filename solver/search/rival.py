@@ -71,6 +71,7 @@ def best_rival(
         As for `search`.
     enough : float, optional
         The search ends as soon as it is decided whether a rival has this Q, and `at_least` cells have been looked at.
+        If that is 0, nothing below it is looked for, which takes less than half the time.
     """
     reflected = known[0].reflected
     seen = np.conj(objective.source) if reflected else objective.source

@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import make_sheet, positions
+from scipy.spatial.transform import Rotation
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon.command_line.program import main  # noqa: E402
-from mobius_extension.mobius_addon.sheet import chosen_keys  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
+from mobius_extension.mobius_addon.sheet import chosen_keys, poses  # noqa: E402
+from mobius_extension.solver import Correspondence  # noqa: E402
 
 OPTIONS = ["--samples", "50", "--targets", "200", "--reflect", "never"]
 KEYS = ("Wobble", "blink_L", "blink_R", "A", "B", "C", "D", "jawOpen")
@@ -80,3 +83,22 @@ def test_lips_that_close_are_shown_over_the_open_jaw() -> None:
     assert together(keys[0], keys[:1]) == keys[:1]
     assert together(keys[1], keys) == [keys[1]]
     assert together(keys[2], keys) == [keys[2]]
+
+
+@pytest.mark.parametrize("reflected", [False, True])
+def test_the_target_is_held_as_the_source_or_as_its_mirror_image(pair: Path, reflected: bool) -> None:
+    source, target = bpy.data.objects["Source"], make_sheet("Copy", 17)
+    turn = Rotation.from_euler("xyz", (2, 1, 3))
+    rest = positions(source)
+    own = rest * [-1, 1, 1] if reflected else rest
+    target.data.vertices.foreach_set("co", (3 * turn.apply(own)).astype(np.float32).ravel())
+    if reflected:
+        target.data.flip_normals()
+    bpy.context.view_layer.update()
+    surfaces = read_surface(source), read_surface(target)
+    faces, size = surfaces[0].rest.faces, len(rest)
+    corner = np.unique(faces, return_index=True)[1]
+    sure = np.ones(size)
+    found = Correspondence(corner // 3, np.eye(3)[corner % 3], sure > 0, sure, faces, size)
+    held = [one.apply(x.rest.vertices) for one, x in zip(poses(source, surfaces, found), surfaces, strict=True)]
+    assert np.abs(held[1] / 3 - held[0] * [-1 if reflected else 1, 1, 1]).max() < 1e-5

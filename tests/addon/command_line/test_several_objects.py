@@ -52,8 +52,10 @@ def folder(tmp_path: Path) -> Path:
     bare.uv_layers.remove(bare.uv_layers[0])
     lamp = make_sheet("Lamp", 5)
     lamp.location.x = 30
+    bpy.ops.mesh.primitive_plane_add(size=50, location=(0, 0, -0.1))
+    bpy.context.active_object.name = "Floor"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "target.blend"))
-    bpy.data.objects.remove(lamp)
+    bpy.data.batch_remove([lamp, bpy.data.objects["Floor"]])
     bpy.ops.export_scene.gltf(filepath=str(tmp_path / "target.glb"))
     return tmp_path
 
@@ -68,7 +70,7 @@ def test_every_object_gets_what_its_counterpart_has(
     said = capsys.readouterr().err
     assert "2 mesh objects" in said
     assert "count as one ('Target', 'Target Eye')" in said
-    assert ("'Lamp' is left out" in said) == (ending == ".blend")
+    assert ("'Floor', 'Lamp' are left out" in said) == (ending == ".blend")
     if ending == ".glb":
         files.new_scene()
         files.import_meshes(out)
@@ -76,7 +78,7 @@ def test_every_object_gets_what_its_counterpart_has(
         bpy.ops.wm.open_mainfile(filepath=str(out))
     skin, eye = bpy.data.objects["Target"], bpy.data.objects["Target Eye"]
     assert sorted(bpy.data.objects.keys()) == sorted(
-        ["Target", "Target Eye", *(["Lamp"] if ending == ".blend" else [])]
+        ["Target", "Target Eye", *(["Lamp", "Floor"] if ending == ".blend" else [])]
     )
     name = "Iris" if ending == ".blend" else "UVMap"  # which .glb does not know, nor groups without bones
     if ending == ".blend":

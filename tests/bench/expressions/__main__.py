@@ -2,6 +2,7 @@
 
     uv run --no-sync python -m tests.bench.expressions -o FOLDER [--pairs ict_1:ict_2] [--kept 1,0.6,0.3] [--keys]
     uv run --no-sync python -m tests.bench.expressions -o FOLDER --pairs ict_1:mpfb_woman --kept 1 --sheet PICTURE.png
+    uv run --no-sync python -m tests.bench.expressions -o FOLDER --pairs ict_1:mpfb_woman --kept 0.6 --limits
 
 The target is another person's head: triangulated, decimated, turned, scaled and moved. Its own expressions, through the
 same, are what ought to arrive. Between heads of one template these are the same displacements on another face, which no
@@ -31,6 +32,7 @@ from mobius_extension.mobius_addon.attributes.expression_names import renamed  #
 
 from solver import AlignSettings, Correspondence, align, correspond, load_map, prepare, save_map  # noqa: E402
 from solver.carry.fitted import is_reflected  # noqa: E402
+from solver.carry.gradients import GradientTransfer  # noqa: E402
 from tests.bench.heads.__main__ import run  # noqa: E402
 from tests.bench.heads.people import Head, read_head  # noqa: E402
 from tests.bench.heads.scenes import save_source, save_target  # noqa: E402
@@ -38,6 +40,7 @@ from tests.bench.heads.targets import Target, target_of  # noqa: E402
 from tests.bench.paper.data import DATA, absent  # noqa: E402
 
 from .carrying import by_map, nearest_point, true_map  # noqa: E402
+from .limits import apart, fitted, lines  # noqa: E402
 from .measures import Judge, Score  # noqa: E402
 
 PEOPLE = ("ict_1", "ict_2", "mpfb_woman", "mpfb_man")
@@ -91,8 +94,7 @@ def one(head: Head, other: Head, kept: float, folder: Path) -> dict[str, dict[st
     rows: dict[str, dict[str, Score]] = {}
     seconds = 0.0
     for name, moved in chosen.items():
-        at_target = np.einsum("qk,qkd->qd", target.barycentric, own[name][other.mesh.faces[target.face]])
-        judge = Judge(target, target.scale * at_target @ target.turn, name == "jawOpen")
+        judge = Judge(target, target.own(other, own[name]), name == "jawOpen")
         started = time.process_time()
         ours = ways(moved)
         seconds += time.process_time() - started
@@ -112,6 +114,27 @@ def one(head: Head, other: Head, kept: float, folder: Path) -> dict[str, dict[st
         flush=True,
     )
     return rows
+
+
+def limits(head: Head, other: Head, kept: float, folder: Path) -> None:
+    """Print what keeps the expressions of one head from those of another's own artist."""
+    target = target_of(other, kept)
+    found, _ = mapped(head, target, folder / f"{head.name}-{other.name}-{kept:g}.npz")
+    mirrored = is_reflected(found, head.mesh, target.mesh)
+    own, keys = keys_of(other), keys_of(head, mirrored)
+    names = [name for name in keys if name in own and np.abs(keys[name]).max() > 0]
+    places = GradientTransfer.of(found, head.mesh, target.mesh)
+    skin, on = target.part == 0, head.part == 0
+    wanted = {name: target.own(other, own[name]) * skin[:, None] for name in names}
+    got = np.stack([places(keys[name])[skin] for name in names])
+    print(f"{head.name} > {other.name}, {kept:.0%}: {len(names)} keys{', mirrored' * mirrored}", flush=True)
+    for way, figure in fitted(np.stack([wanted[name][skin] for name in names]), got).items():
+        print(f"    {way:36} {figure:.3f}")
+    met = lines(target.mesh.vertices, target.mesh.faces[skin[target.mesh.faces].all(axis=1)], wanted)
+    theirs = lines(
+        head.vertices, head.mesh.faces[head.part_of_triangle == 0], {k: v * on[:, None] for k, v in keys.items()}
+    )
+    print("    off, of the distance of the eyes:", apart(head.vertices, theirs, places.places, met), flush=True)
 
 
 def draw(pair: str, kept: float, folder: Path, picture: Path) -> None:
@@ -146,6 +169,7 @@ def main() -> None:
     parser.add_argument("--kept", default="1,0.6,0.3")
     parser.add_argument("--sheet", type=Path, metavar="PICTURE.png", help="draw the first pair, at the first ratio")
     parser.add_argument("--keys", action="store_true", help="a row for each expression, too")
+    parser.add_argument("--limits", action="store_true", help="instead: what a fit to the target's own leaves")
     options = parser.parse_args()
     if reason := absent("heads"):
         raise SystemExit(reason)
@@ -156,6 +180,9 @@ def main() -> None:
     for pair in options.pairs.split(","):
         head, other = (read_head(DATA / "heads", name) for name in pair.split(":"))
         for kept in map(float, options.kept.split(",")):
+            if options.limits:
+                limits(head, other, kept, options.folder)
+                continue
             rows = one(head, other, kept, options.folder)
             print(f"    {'':18}" + "".join(f" {figure:>8}" for figure in FIGURES))
             for way in WAYS:

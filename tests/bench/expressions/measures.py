@@ -71,6 +71,14 @@ class Score:
     wrong: float
 
 
+def meeting_lips(places: np.ndarray, opening: np.ndarray, faces: np.ndarray) -> Contacts:
+    """Return the lips, which are what meets when a jaw closes that a displacement, (n, 3), opens."""
+    lips = find_contacts(places + opening, -opening, faces)
+    other = np.einsum("ck,ckd->cd", lips.barycentric, opening[lips.corners])
+    longest = np.linalg.norm(opening, axis=1).max()  # near the corners of the mouth both move alike
+    return lips.chosen(np.linalg.norm(opening[lips.vertex] - other, axis=1) > APART * longest)
+
+
 class Judge:
     """Who knows the target's own displacement of an expression, (n, 3)."""
 
@@ -83,11 +91,7 @@ class Judge:
         self.moves_parts = bool((size[~self.skin] > MOVING * size.max()).any())
         found = find_contacts(places, np.where(self.skin[:, None], wanted, 0), self.faces)
         self.meeting = found if len(found.vertex) >= FEWEST else None
-        # lips are what meets when an open jaw closes
-        lips = find_contacts(places + wanted, np.where(self.skin[:, None], -wanted, 0), self.faces) if opens else None
-        if lips is not None:  # near the corners of the mouth both move alike
-            other = np.einsum("ck,ckd->cd", lips.barycentric, wanted[lips.corners])
-            lips = lips.chosen(np.linalg.norm(wanted[lips.vertex] - other, axis=1) > APART * size.max())
+        lips = meeting_lips(places, np.where(self.skin[:, None], wanted, 0), self.faces) if opens else None
         self.lips = lips if lips is not None and len(lips.vertex) >= FEWEST else None
 
     def score(self, got: np.ndarray) -> Score:

@@ -36,6 +36,11 @@ class Target:
     turn: np.ndarray
     shift: np.ndarray
 
+    def own(self, head: Head, displacements: np.ndarray) -> np.ndarray:
+        """Return the displacements, (n, 3), that the head's own, (n_head, 3), are here."""
+        there = np.einsum("qk,qkd->qd", self.barycentric, displacements[head.mesh.faces[self.face]])
+        return self.scale * there @ self.turn
+
 
 def decimated(head: Head, kept: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices, triangles and their parts of a head after the collapse mode of Blender's Decimate modifier."""

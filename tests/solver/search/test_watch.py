@@ -153,10 +153,12 @@ def test_a_search_ends_when_it_is_decided_whether_enough_is_reached():
     rng = np.random.default_rng(4)
     source, target = planted(rng, Mobius(0.3, 1.0), 40, 0.4, 0.005)
     whole = search(source, target, 0.03, z_max=0.8)
-    for enough in (whole.value - 5, whole.value + 5):
+    for enough in (whole.value - 5, whole.value, whole.value + 1, whole.value + 5):
         found = search(source, target, 0.03, z_max=0.8, enough=enough)
-        assert found.nodes < whole.nodes
-        assert found.value >= enough or found.upper_bound < enough
+        assert found.nodes <= whole.nodes
+        # decided, and rightly: what is just reached is reached, and the bound is one
+        assert (found.value >= enough) == (whole.value >= enough)
+        assert found.value >= enough or whole.value <= found.upper_bound < enough
 
 
 def test_rivals_do_not_depend_on_machine_or_threads(monkeypatch):
