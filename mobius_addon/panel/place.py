@@ -89,8 +89,8 @@ def draw_wrapped(
 
 def beside_or_below(layout: bpy.types.UILayout, context: bpy.types.Context, *labels: str) -> bpy.types.UILayout:
     """Return a row for two buttons with icons or, where their labels would be cut off, a column."""
-    # as in `draw_wrapped`: tabs and margins take 60, an icon with its margins 26
-    letters = int(((_width(context) - 60) / 2 - 26) / 6.2)
+    # as in `draw_wrapped`: tabs and margins take 60, an icon 20
+    letters = int(((_width(context) - 60) / 2 - 20) / 6.2)
     fits = all(len(iface_(label, "Operator")) <= letters for label in labels)
     return layout.row(align=True) if fits else layout.column(align=True)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...solver.carry.textures import CLIP, EXTEND, MIRROR, REPEAT
 from ...solver.surface.mesh import Floats
+from ..attributes.access import OWN_NAMES
 
 _SHADERS = ("BSDF_PRINCIPLED", "EMISSION", "BSDF_DIFFUSE", "BACKGROUND", "BSDF_TOON", "BSDF_GLOSSY")
 """Shaders that say what color a surface has, the most telling first."""
@@ -88,11 +89,17 @@ Place = tuple[Any, tuple[Any, ...]]
 """A socket, and the group nodes that it is inside of."""
 
 
+def own_colors(obj: bpy.types.Object) -> str:
+    """Return the color attribute that is rendered where there is no material; empty for none, or one of ours."""
+    name = obj.data.attributes.default_color_name
+    return "" if name in OWN_NAMES else name
+
+
 def picture_count(obj: bpy.types.Object) -> int:
     """Return how many pictures an object's materials have, quickly; without a material 1 for its colors, if any."""
     materials = [slot.material for slot in obj.material_slots if slot.material is not None]
     if not materials:
-        return int(bool(obj.data.attributes.default_color_name))
+        return int(bool(own_colors(obj)))
     trees = [x.node_tree for x in materials if x.node_tree is not None]
     images = set()
     for tree in trees:  # grows by the groups in it

@@ -25,7 +25,7 @@ from ..mesh_data import Refusal, foreach
 from .images import FIRST_TILE, read_tiles
 from .layouts import corner_uv, rendered_uv
 from .made import DATA, LINEAR, ChannelPlan
-from .nodes import CHANNELS, Channel, Found, found_in, shader_of, value_of
+from .nodes import CHANNELS, Channel, Found, found_in, own_colors, shader_of, value_of
 
 
 class TextureReader:
@@ -167,7 +167,7 @@ class TextureReader:
     def _shown(self, material: Any, channel: Channel) -> Found | None:
         found = None if material is None else found_in(material, channel)
         if found is None and channel.identifier == "base_color" and (material is None or shader_of(material) is None):
-            name = self.obj.data.attributes.default_color_name  # a scan that has colors and no material
+            name = own_colors(self.obj)  # a scan that has colors and no material
             if name:
                 return Found(None, name, "RGB", "", np.eye(2, 3), 1)
         if found is not None and found.attribute is not None:

@@ -541,6 +541,9 @@ def test_a_preview_that_cannot_be_is_a_warning(pair: tuple[Any, Any], tmp_path: 
 def test_the_panel_counts_the_pictures(sheets: tuple[Any, Any]) -> None:
     source, _ = sheets
     assert picture_count(source) == 0
+    source.data.color_attributes.new("Mobius Pattern", "FLOAT_COLOR", "POINT")
+    source.data.attributes.default_color_name = "Mobius Pattern"
+    assert picture_count(source) == 0  # what Side by Side paints is nobody's texture
     layer = source.data.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
     source.data.attributes.default_color_name = layer.name
     assert picture_count(source) == 1

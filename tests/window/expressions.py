@@ -63,7 +63,11 @@ def steps() -> Wait:
         yield from picture(f"expressions-{number}", 0.05)
     place = region("WINDOW")
     x, y = place.x + place.width // 3, screen_height() - place.y - place.height // 2
-    pointer("mousemove", x, y, "mousedown", 2, "mousemove", x + 40, y, "mousemove", x + 90, y + 10, "mouseup", 2)
+    # a turn for Blender after each: those that come together are one to it
+    for step in (("mousemove", x, y), ("mousedown", 2), *(("mousemove", x + 15 * k, y) for k in range(1, 7))):
+        pointer(*step)
+        yield 0.3
+    pointer("mouseup", 2)
     yield 1.0
     assert turned() != before[1], "the view could not be turned meanwhile"
     assert Play.current is not None, "turning the view has ended it"
