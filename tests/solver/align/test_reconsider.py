@@ -33,6 +33,8 @@ def said(found, sure: float, *, reflected: bool):
         (0.9, 0.9, False, False),
         (0.6, 0.6 * PROVED - 0.01, False, True),
         (0.6, 0.6 * PROVED + 0.01, True, False),
+        (0.6, 0.6, False, True),
+        (0.6, 0.5, False, False),
         (0.8, 0.99, False, True),
         (0.4, 0.9, True, False),
     ],
