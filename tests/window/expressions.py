@@ -115,5 +115,7 @@ def head(file: str, name: str, *, keys: bool) -> Any:
             rows = slice(*stored["key_start"][k : k + 2])
             moved = upright.copy()
             moved[stored["key_vertex"][rows]] += stored["key_offset"][rows][:, [0, 2, 1]] * (1, -1, 1)
-            obj.shape_key_add(name=str(own), from_mix=False).data.foreach_set("co", moved.ravel().astype(np.float32))
+            key = obj.shape_key_add(name=str(own), from_mix=False)
+            key.value = 0  # Blender 5 begins with 1
+            key.data.foreach_set("co", moved.ravel().astype(np.float32))
     return obj
