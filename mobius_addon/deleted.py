@@ -8,6 +8,7 @@ from __future__ import annotations
 import bpy
 
 from .handlers import unwatch, watch
+from .usable import is_deleted
 
 
 def let_go(scene: bpy.types.Scene) -> None:
@@ -16,7 +17,7 @@ def let_go(scene: bpy.types.Scene) -> None:
     for role in ("source", "target"):
         obj = getattr(settings, role)
         # by name first, which is fast
-        if obj is not None and scene.objects.get(obj.name) != obj and not (obj.users_scene or obj.users_collection):
+        if obj is not None and scene.objects.get(obj.name) != obj and is_deleted(obj):
             settings.property_unset(role)
 
 

@@ -129,6 +129,8 @@ GERMAN_SENTENCES = {
     "{} handles": "{} Henkel",
     "{} handle": "{} Henkel",
     "'{}' does not belong to '{}': its size or its tiles are others": "„{}“ gehört nicht zu „{}“: Größe oder Kacheln sind andere",
+    "'{}' has all of the chosen kinds that is on '{}' already": "„{}“ hat von den gewählten Arten schon alles, was auf „{}“ ist",
+    "'{}' has no layer of the chosen kinds to transfer": "„{}“ hat nichts von den gewählten Arten zum Übertragen",
     "'{}' has no armature: there is no rig to carry": "„{}“ hat kein Skelett: Da ist kein Rig zum Übertragen",
     "'{}' is closed and '{}' is not: cut the first open where the second is, or close the second": "„{}“ ist geschlossen und „{}“ nicht: Das erste dort öffnen, wo es das zweite ist, oder das zweite schließen",
     "'{}' is closed, and collections take open surfaces only: cut all open alike": "„{}“ ist geschlossen, und Sammlungen nehmen nur offene Flächen: Alle gleich aufschneiden",

@@ -196,19 +196,19 @@ class JobOperator:
         return {"FINISHED"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Follow the worker; everything but ESC passes through."""
+        """Follow the worker; everything but ESC passes through: with RUNNING_MODAL beside it Blender passes nothing."""
         if event.type == "ESC" and event.value == "PRESS":
             self._job.cancel()
         if self._job.cancelled:  # by ESC or the panel's button
             self._close(context)
             return self._stopped()
         if event.type != "TIMER":
-            return {"RUNNING_MODAL", "PASS_THROUGH"}
+            return {"PASS_THROUGH"}
         if self._job.done:
             self._job.waits = self._why_wait(context) if self._job.error is None else None
         if not self._job.done or self._job.waits:
             self._show(context, self._job.progress)
-            return {"RUNNING_MODAL", "PASS_THROUGH"}
+            return {"PASS_THROUGH"}
         self._close(context)
         try:
             if self._job.error is not None:

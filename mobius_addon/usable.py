@@ -70,6 +70,11 @@ def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     return scene.objects.get(obj.name) == obj or any(other == obj for other in scene.objects)
 
 
+def is_deleted(obj: bpy.types.Object) -> bool:
+    """Return whether an object is in no scene and no collection: deleted, and here only until the file is saved."""
+    return not (obj.users_scene or obj.users_collection)
+
+
 def by_uid(among: Iterable[Any], uid: int | None) -> Any:
     """Return the datablock with Blender's number of this session, which undo and renaming leave alone, or None."""
     return next((block for block in among if block.session_uid == uid), None)

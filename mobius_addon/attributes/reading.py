@@ -35,6 +35,9 @@ from .unmatched import Unmatched
 from .vertex_groups import read_weights
 from .weights import tidied
 
+_LISTED = 3
+"""So many kinds of data are named where the source has none of them."""
+
 _LABELS = {kind.identifier: kind.label for kind in KINDS}
 
 
@@ -85,6 +88,7 @@ class Reading:
         """
         warnings = list(self.warnings)
         layers: list[tuple[_Pending, Carried]] = []
+        same = False
         # pictures take longer than everything else
         share = 1.0 if self.textures is None else 0.1
         for number, pending in enumerate(self.pending):
@@ -96,6 +100,7 @@ class Reading:
             if row.marks:
                 # flags that most meshes have: no word about those that stay as they are
                 if not changes(carried, pending.place.there):
+                    same = True
                     continue
                 if carried.name != name:
                     warnings.append(f"'{self.names[1]}' has an attribute of another type named '{name}': delete it")
@@ -104,6 +109,10 @@ class Reading:
                 warnings.append(missing_warning(row, name, self.names[0], missing))
             layers.append((pending, carried))
         if not layers and self.textures is None:
+            if same and not warnings:
+                raise NothingThere(
+                    f"'{self.names[1]}' has all of the chosen kinds that is on '{self.names[0]}' already"
+                )
             raise NothingThere(_nothing(self.names[0], self.settings, warnings))
         textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))
         warnings += () if textures is None else textures.notes
@@ -356,7 +365,8 @@ def _place(
 
 
 def _nothing(source: str, settings: TransferSettings, warnings: Iterable[str]) -> str:
-    wanted = " or ".join(kind.noun for kind in KINDS if kind.identifier in settings.kinds)
+    nouns = [kind.noun for kind in KINDS if kind.identifier in settings.kinds]
+    wanted = " or ".join(nouns) if len(nouns) <= _LISTED else "layer of the chosen kinds"
     which = {"all": "", "active": "active ", "named": "so named "}[settings.layers]
     why = "; ".join(warnings)
     return f"'{source}' has no {which}{wanted} to transfer" + (f" ({why})" if why else "")

@@ -22,7 +22,7 @@ from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..translation import told
-from ..usable import by_uid, why_not_pair
+from ..usable import by_uid, is_deleted, why_not_pair
 from ..verdict import verdict_sentence
 from . import side_by_side
 
@@ -176,7 +176,7 @@ def as_read(uid: int, name: str, surface: Surface) -> bpy.types.Object:
         It is not.
     """
     obj = by_uid(bpy.data.objects, uid)
-    if obj is None or obj.type != "MESH" or obj.mode != "OBJECT":
+    if obj is None or is_deleted(obj) or obj.type != "MESH" or obj.mode != "OBJECT":
         raise Refusal(rpt_("'{}' was removed or is being edited since the alignment began: align again").format(name))
     if read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
         raise Refusal(rpt_("'{}' was edited during the alignment: align again").format(name))

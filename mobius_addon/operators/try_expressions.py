@@ -83,11 +83,11 @@ class PlayOperator:
         if event.type == "TIMER":
             now = time.monotonic()
             seconds, self._time = now - self._time, now
-            return self._go(context, self._play.go_on(seconds)) | {"PASS_THROUGH"}
+            return self._go(context, self._play.go_on(seconds)) - {"RUNNING_MODAL"} | {"PASS_THROUGH"}
         if event.value == "PRESS" and event.type in ("LEFT_ARROW", "RIGHT_ARROW"):
             return self._go(context, self._play.step(1 if event.type == "RIGHT_ARROW" else -1))
         if event.value != "PRESS" or event.type.startswith(_LOOKING):
-            return {"RUNNING_MODAL", "PASS_THROUGH"}
+            return {"PASS_THROUGH"}  # with RUNNING_MODAL beside it Blender passes nothing on
         self._play.end()
         redraw(context)
         # the click that would press the button again has done so

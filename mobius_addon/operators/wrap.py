@@ -11,7 +11,7 @@ from .. import stored_alignment
 from ..fitting import reshaped_object, wrapped_object
 from ..jobs import JobOperator, Report, Work, why_busy
 from ..mesh_data import Refusal, read_surface
-from ..usable import by_uid, why_not_aligned, why_not_mode
+from ..usable import by_uid, is_deleted, why_not_aligned, why_not_mode
 
 
 class MOBIUS_OT_wrap(JobOperator, bpy.types.Operator):
@@ -63,7 +63,7 @@ class MOBIUS_OT_wrap(JobOperator, bpy.types.Operator):
         """Make the object, if source and target are still what was read."""
         objects = [by_uid(bpy.data.objects, uid) for uid in self.objects_read]
         for obj, name, surface in zip(objects, self._names, self._surfaces, strict=True):
-            if obj is None or read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
+            if obj is None or is_deleted(obj) or read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
                 raise Refusal(rpt_("'{}' was removed or edited meanwhile: call it again").format(name))
         source, target = objects
         onto = self.fitted == "source"

@@ -209,6 +209,22 @@ def test_a_source_without_anything_to_carry_is_refused() -> None:
         plan_transfer(source, target, carrier(source, target), TransferSettings(kinds=("vertex-groups", "uv")))
 
 
+def test_a_source_without_anything_of_many_kinds_is_refused_in_a_few_words() -> None:
+    source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
+    many = TransferSettings(kinds=("vertex-groups", "shape-keys", "uv", "colors"))
+    with pytest.raises(Refusal, match="'Source' has no layer of the chosen kinds to transfer"):
+        plan_transfer(source, target, carrier(source, target), many)
+
+
+def test_flags_that_the_target_has_already_are_not_said_to_be_missing() -> None:
+    source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
+    for obj in (source, target):
+        obj.data.attributes.new("sharp_face", "BOOLEAN", "FACE").data[0].value = True
+    settings = TransferSettings(kinds=("vertex-groups", "uv", "smoothness"))
+    with pytest.raises(Refusal, match="'Target' has all of the chosen kinds that is on 'Source' already"):
+        plan_transfer(source, target, carrier(source, target), settings)
+
+
 def test_what_rendered_on_the_source_renders_on_a_target_that_had_nothing() -> None:
     source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
     for name in ("First", "Second"):

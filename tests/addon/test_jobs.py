@@ -105,10 +105,10 @@ def test_the_window_goes_on_while_the_work_does() -> None:
     operator, window = Operator(), Window()
     assert operator.execute(window) == {"RUNNING_MODAL"}
     assert operator.heard.wait(5)
-    assert operator.modal(window, event("TIMER")) == {"RUNNING_MODAL", "PASS_THROUGH"}
+    assert operator.modal(window, event("TIMER")) == {"PASS_THROUGH"}
     assert window.status[-1] == "Test: Searching: 3.0 of at most 4.0, gap 1.0   |   ESC: Stop"
     for kind in ("MOUSEMOVE", "MIDDLEMOUSE", "A"):
-        assert operator.modal(window, event(kind)) == {"RUNNING_MODAL", "PASS_THROUGH"}
+        assert operator.modal(window, event(kind)) == {"PASS_THROUGH"}
     assert jobs.why_busy() == "Test is under way: press ESC to stop it"
     operator.free.set()
     ended(operator)
@@ -256,7 +256,7 @@ def test_the_result_waits_for_object_mode_and_is_then_written(mode: str) -> None
     sheet.name = "Renamed"
     finished(operator)
     for _ in range(3):
-        assert operator.modal(window, event("TIMER")) == {"RUNNING_MODAL", "PASS_THROUGH"}
+        assert operator.modal(window, event("TIMER")) == {"PASS_THROUGH"}
     assert operator.written == []
     assert window.status[-1] == "Test: Waiting: 'Renamed' has to be in Object Mode   |   ESC: Stop"
     assert jobs.Job.current is operator._job
@@ -274,7 +274,7 @@ def test_the_result_waits_for_other_objects_modes_a_twin_and_the_scene() -> None
     finished(operator)
 
     def waits_for(what: str) -> None:
-        assert operator.modal(window, event("TIMER")) == {"RUNNING_MODAL", "PASS_THROUGH"}
+        assert operator.modal(window, event("TIMER")) == {"PASS_THROUGH"}
         assert what in str(window.status[-1])
 
     window.windows = [SimpleNamespace(view_layer=bpy.context.view_layer, screen=SimpleNamespace(areas=[]))]

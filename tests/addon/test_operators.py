@@ -10,6 +10,8 @@ bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import stored_alignment, topology_cache  # noqa: E402
 from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
+from mobius_extension.mobius_addon.mesh_data import Refusal, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.operators.align import as_read  # noqa: E402
 from mobius_extension.mobius_addon.usable import why_not  # noqa: E402
 
 
@@ -155,6 +157,20 @@ def test_a_foreign_attribute_under_our_name_is_not_overwritten() -> None:
 
 
 # align
+
+
+def test_nothing_is_written_on_what_was_deleted_meanwhile() -> None:
+    """It is there as long as the scene points to it; what is written then is an undo step that nobody sees."""
+    target = make_sheet("Target", 5)
+    bpy.context.scene.mobius.target = target
+    read = target.session_uid, target.name, read_surface(target)
+    assert as_read(*read) == target
+    bpy.ops.object.select_all(action="DESELECT")
+    target.select_set(True)
+    bpy.ops.object.delete()
+    assert bpy.data.objects["Target"].session_uid == read[0]
+    with pytest.raises(Refusal, match="'Target' was removed or is being edited since the alignment began"):
+        as_read(*read)
 
 
 def test_align_writes_on_both_meshes(pair: tuple[Any, Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import hand
 import numpy as np
-from hand import Wait, click_on, escape, find, picture, pointer, redo, screen_height, undo, until
+from hand import Wait, click_on, escape, find, picture, pointer, redo, turn_view, undo, until
 from mathutils import Euler
 
 vars(hand).update(region=region, click=click, shot=shot)
@@ -50,7 +50,7 @@ def steps() -> Wait:
     yield 2.0
     keys = target.data.shape_keys.key_blocks
     keys[3].value = 0.25  # of the person's own
-    before = values(names), turned()
+    before = values(names)
 
     button = yield from find("bpy.ops.mobius.try_expressions")
     yield from click_on(button)
@@ -61,19 +61,11 @@ def steps() -> Wait:
         print(f"[clicks] {name}: {shown}", flush=True)
         assert shown[0] == shown[1] > STRONG, "the source does not go along"
         yield from picture(f"expressions-{number}", 0.05)
-    place = region("WINDOW")
-    x, y = place.x + place.width // 3, screen_height() - place.y - place.height // 2
-    # a turn for Blender after each: those that come together are one to it
-    for step in (("mousemove", x, y), ("mousedown", 2), *(("mousemove", x + 15 * k, y) for k in range(1, 7))):
-        pointer(*step)
-        yield 0.3
-    pointer("mouseup", 2)
-    yield 1.0
-    assert turned() != before[1], "the view could not be turned meanwhile"
+    yield from turn_view()
     assert Play.current is not None, "turning the view has ended it"
     escape()
     yield from until(lambda: Play.current is None)
-    assert values(names) == before[0], "the sliders are not as they were"
+    assert values(names) == before, "the sliders are not as they were"
     yield from picture("expressions-ended")
 
     yield from click_on(button)
@@ -84,7 +76,7 @@ def steps() -> Wait:
     assert Play.current is None
     redo()
     yield from until(lambda: bpy.data.objects[names[1]].data.shape_keys is not None)
-    assert set(values(names)) == set(before[0])
+    assert set(values(names)) == set(before)
     print("[clicks] done", flush=True)
 
 
@@ -107,10 +99,6 @@ def values(names: tuple[str, str]) -> dict[tuple[str, str], float]:
     return {(name, key.name): key.value for name, own in keys.items() for key in own.key_blocks}
 
 
-def turned() -> tuple[float, ...]:
-    return tuple(round(x, 3) for x in bpy.context.space_data.region_3d.view_rotation)
-
-
 def head(file: str, name: str, *, keys: bool) -> Any:
     """Make an object of a head, with its expressions or without."""
     stored = np.load(HEADS / f"{file}.npz")
@@ -127,5 +115,7 @@ def head(file: str, name: str, *, keys: bool) -> Any:
             rows = slice(*stored["key_start"][k : k + 2])
             moved = upright.copy()
             moved[stored["key_vertex"][rows]] += stored["key_offset"][rows][:, [0, 2, 1]] * (1, -1, 1)
-            obj.shape_key_add(name=str(own), from_mix=False).data.foreach_set("co", moved.ravel().astype(np.float32))
+            key = obj.shape_key_add(name=str(own), from_mix=False)
+            key.value = 0  # Blender 5 begins with 1
+            key.data.foreach_set("co", moved.ravel().astype(np.float32))
     return obj

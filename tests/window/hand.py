@@ -59,6 +59,20 @@ def over_the_viewport() -> None:
     pointer("mousemove", part.x + part.width // 3, screen_height() - part.y - 40)
 
 
+def turn_view() -> Wait:
+    """Turn the view with the middle button of the mouse, as one looks around."""
+    turned = lambda: tuple(round(x, 3) for x in bpy.context.space_data.region_3d.view_rotation)  # noqa: E731
+    before, part = turned(), region("WINDOW")
+    x, y = part.x + part.width // 3, screen_height() - part.y - part.height // 2
+    # a turn for Blender after each: those that come together are one to it
+    for step in (("mousemove", x, y), ("mousedown", 2), *(("mousemove", x + 15 * k, y) for k in range(1, 7))):
+        pointer(*step)
+        yield 0.3
+    pointer("mouseup", 2)
+    yield 1.0
+    assert turned() != before, "the view could not be turned"
+
+
 def screen_height() -> int:
     return bpy.context.window.height
 

@@ -4,7 +4,7 @@ import importlib
 from typing import Any
 
 import bpy
-from hand import Wait, picture, until
+from hand import Wait, picture, turn_view, until
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
 
@@ -32,6 +32,7 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     assert bpy.context.mode == "SCULPT"
     yield from until(lambda: jobs.Job.current.waits)
     yield from picture("waiting")
+    yield from turn_view()
     assert kept() == before, "an alignment was written in Sculpt Mode"
     window.workspace = home
     yield from until(lambda: jobs.Job.current is None)
