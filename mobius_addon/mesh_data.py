@@ -128,6 +128,13 @@ def _mixed_keys(mesh: bpy.types.Mesh) -> Floats | None:
     return np.concatenate([*mixed], axis=1)
 
 
+def in_world(obj: bpy.types.Object) -> Floats:
+    """Return the places of a mesh object's vertices in the world, (n, 3)."""
+    own = foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    return own @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def is_mirrored(obj: bpy.types.Object) -> bool:
     """Return whether the object's transform turns left into right."""
     return obj.matrix_world.to_3x3().determinant() < 0

@@ -172,7 +172,7 @@ def write_rig(obj: bpy.types.Object, rig: Rig) -> None:
     Refusal
         The source or its armature has gone since.
     """
-    source = next((x for x in bpy.data.objects if x.session_uid == rig.uid), None)
+    source = _source_of(rig)
     armature = armature_of(source) if source is not None else None
     if source is None or armature is None or [bone.name for bone in armature.data.bones] != [x for x, _ in rig.names]:
         raise Refusal(f"'{rig.source}' is no longer moved by the armature that was read: transfer again")
@@ -189,13 +189,17 @@ def write_rig(obj: bpy.types.Object, rig: Rig) -> None:
 
 def share_rig(obj: bpy.types.Object, others: Sequence[bpy.types.Object], rig: Rig) -> None:
     """Let the armature that `write_rig` has given an object move others too, which belong to it and have none."""
-    source = next((x for x in bpy.data.objects if x.session_uid == rig.uid), None)
+    source = _source_of(rig)
     armature, copy = (armature_of(x) if x is not None else None for x in (source, obj))
     if source is None or armature is None or copy is None:
         return
     for other in others:
         if armature_of(other) is None:
             _attach(other, source, armature, copy, dict(rig.names))
+
+
+def _source_of(rig: Rig) -> bpy.types.Object | None:
+    return next((x for x in bpy.data.objects if x.session_uid == rig.uid), None)
 
 
 def _make(

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from ...solver.surface.mesh import Floats
 from ..attributes.access import BUILT_IN, SHARPNESS
 from ..attributes.rig import armature_of
-from ..mesh_data import foreach
+from ..mesh_data import foreach, in_world
 from .pictures import pictures_of
 
 _SAMPLES = 4000
@@ -195,9 +195,7 @@ def plain_letters(name: str) -> str:
 
 def _places(obj: bpy.types.Object) -> Floats:
     """Return the vertices in the world, (n, 3), from the corner of their box and in units of its diagonal."""
-    own = foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64)
-    matrix = np.array(obj.matrix_world)
-    world = own @ matrix[:3, :3].T + matrix[:3, 3]
+    world = in_world(obj)
     if not len(world):
         return world
     low = world.min(axis=0)

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...solver.surface.mesh import Floats, Integers
-from ..mesh_data import foreach
+from ..mesh_data import foreach, in_world, is_mirrored
 from .polygons import Polygons, put_into_scene
 from .unreadable import Unreadable
 
@@ -108,8 +108,6 @@ def _triangles(obj: bpy.types.Object) -> tuple[Floats, Integers]:
     mesh = obj.data
     mesh.calc_loop_triangles()
     faces = foreach(mesh.loop_triangles, "vertices", 3, np.int32).astype(np.intp)
-    vertices = foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    if np.linalg.det(matrix[:3, :3]) < 0:
+    if is_mirrored(obj):
         faces = faces[:, ::-1]
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces
+    return in_world(obj), faces

@@ -21,9 +21,6 @@ from .unreadable import Unreadable, no_numbers
 if TYPE_CHECKING:
     from ..joined import Member
 
-if TYPE_CHECKING:
-    pass
-
 
 def new_scene() -> None:
     """Begin with an empty scene; the person's settings and add-ons stay."""

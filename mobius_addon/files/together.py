@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...solver.surface.mesh import Floats
-from ..mesh_data import foreach
+from ..mesh_data import foreach, in_world
 from .reading import Imported, listed, meant, require_places
 from .unreadable import Unreadable
 
@@ -78,15 +78,9 @@ def _is_hidden(imported: Imported) -> bool:
     return obj.hide_viewport or obj.hide_render or obj.display_type in ("BOUNDS", "WIRE") or obj.hide_get()
 
 
-def _places(imported: Imported) -> Floats:
-    own = foreach(imported.obj.data.vertices, "co", 3, np.float32).astype(np.float64)
-    matrix = np.array(imported.obj.matrix_world, dtype=np.float64)
-    return own @ matrix[:3, :3].T + matrix[:3, 3]
-
-
 def _box(imported: Imported) -> Floats:
     """Return the corners of an object's box in the world, (2, 3)."""
-    places = _places(imported)
+    places = in_world(imported.obj)
     return np.array([places.min(axis=0), places.max(axis=0)])
 
 
@@ -94,5 +88,5 @@ def _area(imported: Imported) -> float:
     """Return the area of an object's faces in the world."""
     mesh = imported.obj.data
     mesh.calc_loop_triangles()
-    corners = _places(imported)[foreach(mesh.loop_triangles, "vertices", 3, np.int32)]
+    corners = in_world(imported.obj)[foreach(mesh.loop_triangles, "vertices", 3, np.int32)]
     return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())

@@ -101,7 +101,6 @@ def export_mesh(
     path : Path
     folder : Path, optional
         Where the file will lie in the end, whose other files keep their names; by default where it is written.
-
     others : sequence of bpy.types.Object
 
     Raises
