@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,31 +54,25 @@ def refined(
     slopes = domain.gradients(target.places, target.mesh.faces, target_descriptors)
     depth = domain.depth(source.places[used])
     stages = _stages(depth, share)
-    for number, seen in enumerate(stages):
-        chosen = used[seen]
-        mobius = _improved(
-            mobius,
-            source.places[chosen],
-            source_descriptors[chosen],
-            share[seen],
-            domain,
+
+    def agreement(some: Integers) -> _Agreement:
+        return _Agreement(
+            source.places[used[some]],
+            source_descriptors[used[some]],
+            share[some],
             target.triangles,
             target_descriptors,
-            slopes,
             scale,
-            None if progress is None else lambda done, n=number: progress((n + done) / len(stages)),
         )
+
+    for number, seen in enumerate(stages):
+        tell = None if progress is None else lambda done, n=number: progress((n + done) / len(stages))
+        mobius = _improved(mobius, agreement(seen), domain, slopes, tell)
     if not (isinstance(source, Flattening) and isinstance(target, Flattening)):
         return mobius
     met = end_to_end(mobius, source, target)
-
-    def value(trial: Any) -> float:
-        face, barycentric = target.triangles.locate(trial(source.places[used]))
-        there = np.einsum("qk,qkd->qd", barycentric, target_descriptors[target.triangles.faces[face]])
-        apart = ((source_descriptors[used] - there) ** 2).sum(axis=1)
-        return float((share * np.exp(-apart / (2 * scale**2))).sum())
-
-    return met if met is not None and value(met) > value(mobius) else mobius
+    of_all = agreement(stages[-1])
+    return met if met is not None and of_all.at(met)[0] > of_all.at(mobius)[0] else mobius
 
 
 def _stages(depth: Floats, share: Floats) -> list[Integers]:
@@ -102,29 +97,32 @@ def _stages(depth: Floats, share: Floats) -> list[Integers]:
     return [*stages, np.arange(len(depth))]
 
 
-def _improved(
-    mobius: Any,
-    points: Places,
-    expected: Floats,
-    weights: Floats,
-    domain: Domain,
-    disc: TriangulatedDisc,
-    target_descriptors: Floats,
-    slopes: Places,
-    scale: float,
-    progress: Callable[[float], None] | None,
-) -> Any:
-    """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
-    faces = disc.faces
+@dataclass(frozen=True, eq=False)
+class _Agreement:
+    """How well descriptors of source points, at places of its domain, agree with the target's where they are taken."""
 
-    def agreement(trial: Any, near: Integers | None = None) -> tuple[float, Places, Integers, Floats, Floats]:
-        place = trial(points)
-        face, barycentric = disc.locate(place, near)
-        residual = expected - np.einsum("qk,qkd->qd", barycentric, target_descriptors[faces[face]])
-        term = weights * np.exp(-(residual**2).sum(axis=1) / (2 * scale**2))
+    points: Places
+    expected: Floats
+    weights: Floats
+    disc: TriangulatedDisc
+    target_descriptors: Floats
+    scale: float
+
+    def at(self, trial: Any, near: Integers | None = None) -> tuple[float, Places, Integers, Floats, Floats]:
+        """Return the sum that is maximised; the points' images and triangles, what descriptors differ by, the terms."""
+        place = trial(self.points)
+        face, barycentric = self.disc.locate(place, near)
+        there = self.target_descriptors[self.disc.faces[face]]
+        residual = self.expected - np.einsum("qk,qkd->qd", barycentric, there)
+        term = self.weights * np.exp(-(residual**2).sum(axis=1) / (2 * self.scale**2))
         return float(term.sum()), place, face, residual, term
 
-    value, place, face, residual, term = agreement(mobius)
+
+def _improved(
+    mobius: Any, agreement: _Agreement, domain: Domain, slopes: Places, progress: Callable[[float], None] | None
+) -> Any:
+    """Return the transformation near `mobius` at which the descriptors of the given source points agree best."""
+    value, place, face, residual, term = agreement.at(mobius)
     damping = 1e-4
     for step_number in range(30):
         jacobian = domain.jacobian(place, slopes[face])
@@ -137,7 +135,7 @@ def _improved(
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(force)), force)
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
             trial = domain.near_identity(step) @ mobius
-            found = agreement(trial, face)
+            found = agreement.at(trial, face)
             if found[0] > value:
                 break
             damping *= 10
