@@ -552,4 +552,5 @@ GERMAN = {
     "Open the guide, a page that comes with the extension, in the web browser": "Die Anleitung, eine Seite der Erweiterung, im Webbrowser öffnen",
     "The guide '{}' is missing: install the extension again": "Die Anleitung „{}“ fehlt: die Erweiterung neu installieren",
     "In the 3D viewport: press N, tab Möbius": "In der 3D-Ansicht: N drücken, Reiter Möbius",
+    "{} ({:,} vertices are selected: see them in Edit Mode)": "{} ({:,} Punkte sind ausgewählt: im Bearbeitungsmodus zu sehen)",
 }

@@ -64,6 +64,9 @@ class Job:
     current: ClassVar[Job | None] = None
     """The one that runs in the window."""
 
+    refused: ClassVar[tuple[str, tuple[int, ...]]] = ("", ())
+    """Why the last one in the window came to nothing, for the panel, and the numbers of the objects it was about."""
+
     def __init__(self, work: Work, title: str = "") -> None:
         self.title = title
         self.begun = time.monotonic()
@@ -175,6 +178,7 @@ class JobOperator:
         # a repeated operator belongs to Blender's list of those that are done: as a modal one it would be freed twice
         if in_window and not self.options.is_repeat:
             self._job = Job.current = Job(work, self.job_title)
+            Job.refused = "", ()
             self._shown: tuple[str, int] | None = None
             self._job.timer = manager.event_timer_add(INTERVAL, window=context.window)
             manager.modal_handler_add(self)
@@ -216,7 +220,9 @@ class JobOperator:
             self.finish(context, self._job.result)
             redraw(context)
         except (Refusal, MeshError) as refusal:
-            return self._refused(refusal)
+            Job.refused = told(str(refusal)), self.objects_read
+            # an error would pop up under the mouse, long after the click, and take the next key: an undo most likely
+            return self._refused(refusal, "WARNING")
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -263,8 +269,8 @@ class JobOperator:
         clear_status(self._job)
         redraw(context)
 
-    def _refused(self, error: Exception) -> set[str]:
-        self.report({"ERROR"}, told(str(error)))
+    def _refused(self, error: Exception, kind: str = "ERROR") -> set[str]:
+        self.report({kind}, told(str(error)))
         return {"CANCELLED"}
 
     def _stopped(self) -> set[str]:

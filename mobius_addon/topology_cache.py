@@ -14,6 +14,7 @@ from ..solver.align.held import held
 from . import edits
 from .computation import Repair, in_order
 from .mesh_data import Surface, foreach, read_surface
+from .translation import told
 
 MAX_POLYGONS = 200_000
 """Larger meshes are checked when asked only, so that drawing the panel never takes noticeable time."""
@@ -21,7 +22,7 @@ MAX_POLYGONS = 200_000
 MAX_FLATTENED = 40_000
 """Triangles up to which the disc is looked at too, in 0.3 s of the processor; of others the button *Check* tells."""
 
-_HELD = {
+HELD = {
     "narrow": n_("long and narrow: less exact"),
     "deep": n_("deep: better cut out a piece"),
     "too deep": n_("too deep: a piece will be cut out"),
@@ -67,7 +68,7 @@ def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
         try:
             store(obj, read_surface(obj), repair)
         except MeshError as error:
-            _lines[key] = Line(_rows(str(error).removeprefix(f"'{obj.name}' ")), False)
+            _lines[key] = Line(_rows(error, obj.name), False)
     return _lines[key]
 
 
@@ -99,7 +100,7 @@ def _line(surface: Surface, repair: Repair) -> Line:
         tidy = in_order(mesh, repair, surface.keys)
         mesh, changes = tidy.mesh, len(tidy.changes)
     except MeshError as error:
-        refused = _rows(str(error).removeprefix(f"'{mesh.name}' "))
+        refused = _rows(error, mesh.name)
     else:
         refused = None
     found = topology(mesh)
@@ -111,7 +112,7 @@ def _line(surface: Surface, repair: Repair) -> Line:
     try:
         mended += _held(tidy, repair) if tidy else ()
     except MeshError as error:
-        return Line(_rows(str(error).removeprefix(f"'{mesh.name}' ")), False)
+        return Line(_rows(error, mesh.name), False)
     if not found.boundary_loops:
         return Line((iface_("closed, {:,} vertices").format(found.vertices), *mended), True, bool(changes))
     if openings := len(found.boundary_loops) - 1:
@@ -125,7 +126,7 @@ def _held(tidy: Cleaned, repair: Repair) -> tuple[str, ...]:
     if len(tidy.mesh.faces) > MAX_FLATTENED:
         return ()
     found = held(tidy, fill_holes=repair.fill_holes)
-    return () if found is None else (iface_(_HELD[found.kind]),)
+    return () if found is None else (iface_(HELD[found.kind]),)
 
 
 def _problem(found: Topology, repair: Repair) -> tuple[str, str, str] | None:
@@ -144,9 +145,11 @@ def _problem(found: Topology, repair: Repair) -> tuple[str, str, str] | None:
     return None
 
 
-def _rows(problem: str) -> tuple[str, ...]:
-    """Split what is wrong from what to do about it."""
-    return tuple(problem.split(": ", 1))
+def _rows(error: MeshError, name: str) -> tuple[str, ...]:
+    """Split what is wrong with a mesh, without its name, which stands above, from what to do about it."""
+    start, _, rest = told(str(error)).partition(name)
+    # the quotes are those of the language
+    return tuple((rest[1:].lstrip() if len(start) == 1 else start + name + rest).split(": ", 1))
 
 
 def _key(obj: bpy.types.Object, repair: Repair) -> tuple[int | str, ...]:

@@ -367,6 +367,7 @@ def _place(
 def _nothing(source: str, settings: TransferSettings, warnings: Iterable[str]) -> str:
     nouns = [kind.noun for kind in KINDS if kind.identifier in settings.kinds]
     wanted = " or ".join(nouns) if len(nouns) <= _LISTED else "layer of the chosen kinds"
-    which = {"all": "", "active": "active ", "named": "so named "}[settings.layers]
+    if settings.layers != "all":
+        wanted = f"active {wanted}" if settings.layers == "active" else f"so named {wanted}"
     why = "; ".join(warnings)
-    return f"'{source}' has no {which}{wanted} to transfer" + (f" ({why})" if why else "")
+    return f"'{source}' has no {wanted} to transfer ({why})" if why else f"'{source}' has no {wanted} to transfer"

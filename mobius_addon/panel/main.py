@@ -41,6 +41,7 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             column.scale_y = 1.4
             button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
             hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
+            _draw_refused(layout, context)
             if len(selected_targets(context)) > 1:
                 several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
                 hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
@@ -79,6 +80,15 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     draw_remedies(column, obj, line)
     if role == "target" and (reason := why_not_written(obj)):
         draw_sentence(column, context, reason, "LOCKED")
+
+
+def _draw_refused(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw why the last work came to nothing, if it was about what is chosen: the status bar says so for seconds."""
+    why, about = Job.refused
+    settings = context.scene.mobius
+    chosen = {obj.session_uid for obj in (settings.source, settings.target) if obj is not None}
+    if why and chosen and chosen <= set(about):
+        draw_sentence(layout.column(align=True), context, why, "ERROR")
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:

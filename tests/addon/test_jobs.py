@@ -179,7 +179,9 @@ def test_what_goes_wrong_in_the_thread_is_reported() -> None:
     operator.free.set()
     ended(operator)
     assert operator.modal(window, event("TIMER")) == {"CANCELLED"}
-    assert operator.said == [({"ERROR"}, "'Scan' is closed")]
+    # in the status bar: a popup would take the next key
+    assert operator.said == [({"WARNING"}, "'Scan' is closed")]
+    assert jobs.Job.refused[0] == "'Scan' is closed"
     operator = Operator(ZeroDivisionError("a fault of ours"))
     operator.execute(window)
     operator.free.set()

@@ -302,6 +302,19 @@ def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], mon
         bpy.ops.mobius.align()
 
 
+def test_the_panel_keeps_saying_why_work_came_to_nothing(
+    pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = pair
+    why = "'Target' was edited during the alignment: align again"
+    monkeypatch.setattr(jobs.Job, "refused", (why, (source.session_uid, target.session_uid)))
+    assert "'Target' was edited during the alignment align again" in " ".join(drawn(panel.MOBIUS_PT_main))
+    bpy.context.scene.mobius.target = None  # as it is once the target is deleted
+    assert "align again" in drawn(panel.MOBIUS_PT_main)
+    bpy.context.scene.mobius.target = make_sheet("Another", 5)
+    assert "align again" not in drawn(panel.MOBIUS_PT_main)
+
+
 # swap
 
 
@@ -443,7 +456,7 @@ def test_the_last_transfer_stands_in_the_panel_layer_by_layer(pair: tuple[Any, A
     assert "Group 0" not in said
     together = " ".join(said)
     assert "'Group 0' is locked on 'Target' and left as it is" in together
-    assert "'Target' keeps its own vertex group 'Right'" in together
+    assert "'Target' keeps its own vertex group ('Right')" in together
     bpy.ops.ed.undo()
     assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
     bpy.context.scene.mobius.target.data.mobius_transferred = '{"layers": 3}'

@@ -133,7 +133,7 @@ def steps() -> Wait:
     yield 1.0
     assert Job.current is None, "the work goes on after its file was closed"
     assert not bpy.context.window_manager.mobius_view.discs
-    yield from showing.opened(names)
+    yield from showing.opened(PACKAGE, names)
     print("[clicks] done", flush=True)
 
 
