@@ -10,6 +10,7 @@ from ..jobs import Job, MOBIUS_OT_stop, describe_left, describe_proof
 from ..operators.align import MOBIUS_OT_align
 from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check
+from ..operators.join_copy import MOBIUS_OT_join_copy, selected_with
 from ..operators.swap import MOBIUS_OT_swap
 from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
@@ -78,6 +79,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if line.remedy:
         column.prop(settings, line.remedy, toggle=True)
     draw_remedies(column, obj, line)
+    if others := selected_with(context, role):
+        text = iface_("Join a Copy of {:,} Selected").format(len(others) + 1)
+        column.operator(MOBIUS_OT_join_copy.bl_idname, text=text, icon="AUTOMERGE_ON", translate=False).role = role
     if role == "target" and (reason := why_not_written(obj)):
         draw_sentence(column, context, reason, "LOCKED")
 

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,12 @@ def of_code() -> set[str]:
 
 
 def _calls(path: Path) -> Iterator[ast.Call]:
-    return (x for x in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(x, ast.Call))
+    return (x for x in ast.walk(_tree(path)) if isinstance(x, ast.Call))
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def constants(node: ast.AST) -> Iterator[str]:
@@ -88,7 +94,7 @@ def of_sentences() -> set[str]:
                 said = call.args[:1] if name in errors else call.args[1:2] if name in ("report", "_report") else []
                 found |= {text for argument in said for text in _templates(argument)}
             if path.parent.name in SAYING:
-                found |= _said(ast.parse(path.read_text(encoding="utf-8")))
+                found |= _said(_tree(path))
     return {text for text in found if text.count(" ") > 2}
 
 
@@ -97,7 +103,7 @@ def artists_errors() -> set[str]:
     parents: dict[str, set[str]] = {}
     for folder in ("solver", "mobius_addon"):
         for path in (ROOT / folder).glob("**/*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(_tree(path)):
                 if isinstance(node, ast.ClassDef):
                     parents[node.name] = {x.id for x in node.bases if isinstance(x, ast.Name)}
     found, more = set(), {"Refusal", "MeshError"}

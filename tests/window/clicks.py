@@ -109,7 +109,9 @@ def steps() -> Wait:
     yield from picture("discs")
     bpy.context.space_data.show_region_ui = True
     bpy.context.preferences.view.language = "de_DE"
+    yield 1.0
     yield from picture("german")
+    assert region("UI").width > 1, "the panel is not to be seen"
     bpy.context.preferences.view.language = "en_US"
     yield 0.5
 
