@@ -195,6 +195,8 @@ GERMAN_SENTENCES = {
     "{} vertex": "{} Punkt",
     "{} face corners": "{} Flächenecken",
     "{} face corner": "{} Flächenecke",
+    # what is being carried
+    "{} of '{}'": "{} von „{}“",
     # kinds of data within a sentence, and with their number
     "vertex group": "Punktgruppe",
     "{} vertex group": "{} Punktgruppe",

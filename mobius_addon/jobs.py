@@ -250,7 +250,7 @@ class JobOperator:
 
     def _show(self, context: bpy.types.Context, progress: Progress) -> None:
         """Say in the status bar and the panel where the work is, if that is news."""
-        stage = iface_("Waiting") if self._job.waits else iface_(progress.stage)
+        stage = iface_("Waiting") if self._job.waits else told(progress.stage)
         now = ": ".join(filter(None, (iface_(self.job_title), stage, self._job.waits or describe_proof(progress))))
         left = describe_left(self._job)
         shown = f"{now}, {left}" if left else now, round(100 * progress.fraction)

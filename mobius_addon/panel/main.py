@@ -15,6 +15,7 @@ from ..operators.swap import MOBIUS_OT_swap
 from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
+from ..translation import told
 from ..usable import why_not, why_not_written
 from .help import draw_help
 from .mending import draw_menu, draw_remedies
@@ -98,7 +99,7 @@ def _draw_refused(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
     """Draw how far the work under way is, and what it has proved."""
     row = layout.row(align=True)
-    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
+    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else told(job.progress.stage))
     row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
     # always two rows, so that what is below stays where it is
     layout.label(text=job.waits or describe_left(job) or iface_("ESC stops"), translate=False)

@@ -89,6 +89,7 @@ def test_what_a_transfer_says_is_translated() -> None:
     left = "2,000 vertices of 'B' (3.0% of its area) have no certain counterpart and are left as they were"
     assert translation.told(left).startswith("2,000 Punkte von „B“ (3.0% der Fläche) haben kein sicheres Gegenstück")
     assert translation.told("1 vertex group, 12 UV maps") == "1 Punktgruppe, 12 UV-Maps"
+    assert translation.told("Vertex Groups of 'B'") == "Punktgruppen von „B“"
 
 
 def blenders_own() -> dict[str, set[str]]:
