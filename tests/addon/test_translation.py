@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 import texts
+from scenes import make_object
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import translation  # noqa: E402
+from mobius_extension.mobius_addon import topology_cache, translation  # noqa: E402
+from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
 from mobius_extension.mobius_addon.german_sentences import GERMAN_SENTENCES  # noqa: E402
 
@@ -90,6 +92,11 @@ def test_what_a_transfer_says_is_translated() -> None:
     assert translation.told(left).startswith("2,000 Punkte von „B“ (3.0% der Fläche) haben kein sicheres Gegenstück")
     assert translation.told("1 vertex group, 12 UV maps") == "1 Punktgruppe, 12 UV-Maps"
     assert translation.told("Vertex Groups of 'B'") == "Punktgruppen von „B“"
+
+
+def test_what_is_wrong_with_a_mesh_is_translated_without_its_name() -> None:
+    empty = make_object("Points", [(0, 0, 0), (1, 0, 0)], [])
+    assert topology_cache.line_of(empty, Repair()).rows == ("hat keine Flächen",)
 
 
 def blenders_own() -> dict[str, set[str]]:
