@@ -78,7 +78,7 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = source, target
     bpy.ops.ed.undo_push(message="before it is deleted")
     before = everything()
-    yield from align(jobs, names, 150)
+    yield from align(jobs, names, 150, quick=False)
     over_the_viewport()
     yield 0.5
     pointer("key", "x")
@@ -95,10 +95,10 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     assert everything() == before
 
 
-def align(jobs: Any, names: tuple[str, str], samples: int) -> Wait:
+def align(jobs: Any, names: tuple[str, str], samples: int, *, quick: bool = True) -> Wait:
     """Begin to align the meshes of these names, with so many samples that the result is not known yet."""
     bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = (bpy.data.objects[name] for name in names)
-    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **QUICK | {"samples": samples})
+    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **(QUICK if quick else {}) | {"samples": samples})
     yield from until(lambda: jobs.Job.current is not None)
 
 
