@@ -129,7 +129,7 @@ GERMAN_SENTENCES = {
     "{} handles": "{} Henkel",
     "{} handle": "{} Henkel",
     "'{}' does not belong to '{}': its size or its tiles are others": "„{}“ gehört nicht zu „{}“: Größe oder Kacheln sind andere",
-    "'{}' has all of the chosen kinds that is on '{}' already": "„{}“ hat von den gewählten Arten schon alles, was auf „{}“ ist",
+    "'{}' already has everything of the chosen kinds that is on '{}'": "„{}“ hat von den gewählten Arten schon alles, was auf „{}“ ist",
     "'{}' has no {} to transfer": "„{}“ hat keine {} zum Übertragen",
     "'{}' has no {} to transfer ({})": "„{}“ hat keine {} zum Übertragen ({})",
     "layer of the chosen kinds": "Schichten der gewählten Arten",

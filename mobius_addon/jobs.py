@@ -17,6 +17,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import bpy
@@ -39,6 +40,15 @@ INTERVAL = 0.1
 
 SOON, EARLY = 1.0, 0.1
 """Seconds, and the share of the work, before which nobody can say how long it will take."""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Work that came to nothing: its title, why, and the numbers of the objects that it was to write on or about."""
+
+    title: str
+    why: str
+    objects: tuple[int, ...]
 
 
 class Job:
@@ -64,8 +74,8 @@ class Job:
     current: ClassVar[Job | None] = None
     """The one that runs in the window."""
 
-    refused: ClassVar[tuple[str, tuple[int, ...]]] = ("", ())
-    """Why the last one in the window came to nothing, for the panel, and the numbers of the objects it was about."""
+    refused: ClassVar[Refused | None] = None
+    """The last one in the window, if it came to nothing."""
 
     def __init__(self, work: Work, title: str = "") -> None:
         self.title = title
@@ -178,7 +188,7 @@ class JobOperator:
         # a repeated operator belongs to Blender's list of those that are done: as a modal one it would be freed twice
         if in_window and not self.options.is_repeat:
             self._job = Job.current = Job(work, self.job_title)
-            Job.refused = "", ()
+            Job.refused = None
             self._shown: tuple[str, int] | None = None
             self._job.timer = manager.event_timer_add(INTERVAL, window=context.window)
             manager.modal_handler_add(self)
@@ -220,7 +230,7 @@ class JobOperator:
             self.finish(context, self._job.result)
             redraw(context)
         except (Refusal, MeshError) as refusal:
-            Job.refused = told(str(refusal)), self.objects_read
+            Job.refused = Refused(self.job_title, told(str(refusal)), self.objects_read)
             # an error would pop up under the mouse, long after the click, and take the next key: an undo most likely
             return self._refused(refusal, "WARNING")
         return {"FINISHED"}

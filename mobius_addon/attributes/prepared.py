@@ -102,7 +102,7 @@ class Reading:
         if not layers and self.textures is None:
             if same and not warnings:
                 raise NothingThere(
-                    f"'{self.names[1]}' has all of the chosen kinds that is on '{self.names[0]}' already"
+                    f"'{self.names[1]}' already has everything of the chosen kinds that is on '{self.names[0]}'"
                 )
             raise NothingThere(nothing(self.names[0], self.settings, warnings))
         textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))

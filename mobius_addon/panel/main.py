@@ -12,6 +12,7 @@ from ..operators.align_selected import MOBIUS_OT_align_selected, selected_target
 from ..operators.check import MOBIUS_OT_check
 from ..operators.join_copy import MOBIUS_OT_join_copy, selected_with
 from ..operators.swap import MOBIUS_OT_swap
+from ..operators.transfer import MOBIUS_OT_transfer
 from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
@@ -19,7 +20,7 @@ from ..translation import told
 from ..usable import why_not, why_not_written
 from .help import draw_help
 from .mending import draw_menu, draw_remedies
-from .place import MobiusPanel, beside_or_below, draw_sentence, draw_wrapped, hand_on
+from .place import MobiusPanel, beside_or_below, draw_refused, draw_sentence, draw_wrapped, hand_on
 
 
 class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
@@ -43,8 +44,9 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             column.scale_y = 1.4
             button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
             hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
-            _draw_refused(layout, context)
-            if len(selected_targets(context)) > 1:
+            if Job.refused is not None and Job.refused.title != MOBIUS_OT_transfer.job_title:
+                draw_refused(layout, context)
+            if settings.source is not None and len(selected_targets(context)) > 1:
                 several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
                 hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
         draw_help(layout, context)
@@ -85,15 +87,6 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
         column.operator(MOBIUS_OT_join_copy.bl_idname, text=text, icon="AUTOMERGE_ON", translate=False).role = role
     if role == "target" and (reason := why_not_written(obj)):
         draw_sentence(column, context, reason, "LOCKED")
-
-
-def _draw_refused(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw why the last work came to nothing, if it was about what is chosen: the status bar says so for seconds."""
-    why, about = Job.refused
-    settings = context.scene.mobius
-    chosen = {obj.session_uid for obj in (settings.source, settings.target) if obj is not None}
-    if why and chosen and chosen <= set(about):
-        draw_sentence(layout.column(align=True), context, why, "ERROR")
 
 
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:

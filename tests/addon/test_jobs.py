@@ -181,7 +181,7 @@ def test_what_goes_wrong_in_the_thread_is_reported() -> None:
     assert operator.modal(window, event("TIMER")) == {"CANCELLED"}
     # in the status bar: a popup would take the next key
     assert operator.said == [({"WARNING"}, "'Scan' is closed")]
-    assert jobs.Job.refused[0] == "'Scan' is closed"
+    assert jobs.Job.refused == jobs.Refused("Test", "'Scan' is closed", ())
     operator = Operator(ZeroDivisionError("a fault of ours"))
     operator.execute(window)
     operator.free.set()

@@ -219,7 +219,8 @@ def test_every_remark_stands_in_the_panel_with_its_remedy(
     rest = said[said.index("Side by Side") + 1 :]
     buttons = ("Take", "Search", "landmarks", "source_cut", "target_cut")
     assert [text for text in rest if text.startswith(buttons)] == offered
-    words = " ".join(text for text in rest if text not in offered)
+    labels = {"Landmarks", "Cut Source To", "Cut Target To"}
+    words = " ".join(text for text in rest if text not in {*offered, *labels})
     assert words == " ".join(one.text for one in found.concerns)
     assert panel.MOBIUS_PT_notes.poll(bpy.context) == bool(found.notes)
 
@@ -305,12 +306,18 @@ def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], mon
 def test_the_panel_keeps_saying_why_work_came_to_nothing(
     pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source, target = pair
+    uids = tuple(obj.session_uid for obj in pair)
     why = "'Target' was edited during the alignment: align again"
-    monkeypatch.setattr(jobs.Job, "refused", (why, (source.session_uid, target.session_uid)))
+    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Align", why, uids))
     assert "'Target' was edited during the alignment align again" in " ".join(drawn(panel.MOBIUS_PT_main))
+    assert "align again" not in drawn(panel.MOBIUS_PT_transfer)
     bpy.context.scene.mobius.target = None  # as it is once the target is deleted
     assert "align again" in drawn(panel.MOBIUS_PT_main)
+    bpy.context.scene.mobius.target = pair[1]
+    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Transfer", "'Source' has nothing: add some", uids[1:]))
+    assert "add some" in drawn(panel.MOBIUS_PT_transfer)
+    assert "add some" not in drawn(panel.MOBIUS_PT_main)
+    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Align", why, uids))
     bpy.context.scene.mobius.target = make_sheet("Another", 5)
     assert "align again" not in drawn(panel.MOBIUS_PT_main)
 

@@ -64,7 +64,7 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
         bpy.ops.wm.window_close()
     yield 1.0
     assert kept() != before, "another window was in the way"
-    assert not jobs.Job.refused[0]
+    assert jobs.Job.refused is None
     yield from deleted(jobs, names)
     print("[clicks] results waited for Object Mode and were then written", flush=True)
 
@@ -87,7 +87,7 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     yield from until(lambda: names[1] not in bpy.context.view_layer.objects)
     assert jobs.Job.current is not None, "it was deleted too late"
     yield from until(lambda: jobs.Job.current is None)
-    assert "was removed" in jobs.Job.refused[0]
+    assert "was removed" in jobs.Job.refused.why
     yield from picture("deleted-meanwhile")
     undo()
     yield from until(lambda: names[1] in bpy.context.view_layer.objects)
