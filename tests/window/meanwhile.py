@@ -7,6 +7,8 @@ import bpy
 from hand import Wait, over_the_viewport, picture, pointer, turn_view, undo, until
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
+LONG = {"samples": 100, "targets": 2000, "reflect": "auto", "refine": "dense"}
+"""Blender keeps what an operator was last called with: what is to be otherwise has to be said."""
 
 
 def steps(package: str, names: tuple[str, str]) -> Wait:
@@ -78,7 +80,7 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = source, target
     bpy.ops.ed.undo_push(message="before it is deleted")
     before = everything()
-    yield from align(jobs, names, 150, quick=False)
+    yield from align(jobs, names, 150, LONG)
     over_the_viewport()
     yield 0.5
     pointer("key", "x")
@@ -95,10 +97,10 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     assert everything() == before
 
 
-def align(jobs: Any, names: tuple[str, str], samples: int, *, quick: bool = True) -> Wait:
+def align(jobs: Any, names: tuple[str, str], samples: int, how: dict[str, Any] = QUICK) -> Wait:
     """Begin to align the meshes of these names, with so many samples that the result is not known yet."""
     bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = (bpy.data.objects[name] for name in names)
-    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **(QUICK if quick else {}) | {"samples": samples})
+    bpy.ops.mobius.align("INVOKE_DEFAULT", True, **how | {"samples": samples})
     yield from until(lambda: jobs.Job.current is not None)
 
 
