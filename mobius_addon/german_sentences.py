@@ -265,6 +265,12 @@ GERMAN_SENTENCES = {
     "{} face without area": "{} Fläche ohne Flächeninhalt",
     "{} smaller parts aligned beside it": "{} kleinere Teile daneben ausgerichtet",
     "{} smaller part aligned beside it": "{} kleinerer Teil daneben ausgerichtet",
+    "{} other parts aligned beside it": "{} andere Teile daneben ausgerichtet",
+    "{} other part aligned beside it": "{} anderer Teil daneben ausgerichtet",
+    "{} smaller parts beside it": "{} kleinere Teile daneben",
+    "{} smaller part beside it": "{} kleinerer Teil daneben",
+    "{} other parts beside it": "{} andere Teile daneben",
+    "{} other part beside it": "{} anderer Teil daneben",
     # what Flatten says
     "'{}' has a boundary: only what is closed goes to a sphere": "„{}“ hat einen Rand: Nur Geschlossenes kommt auf eine Kugel",
     "'{}': {} too small in the disc for the precision of a UV map": "„{}“: {} in der Scheibe zu klein für die Genauigkeit einer UV-Map",

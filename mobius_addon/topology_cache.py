@@ -11,6 +11,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ..solver import Cleaned, MeshError, Topology, topology
 from ..solver.align.held import held
+from ..solver.surface.cleaning import LEFT_OUT
 from . import edits
 from .computation import Repair, in_order
 from .mesh_data import Surface, foreach, read_surface
@@ -108,7 +109,10 @@ def _line(surface: Surface, repair: Repair) -> Line:
         return Line(problem[:2], False, True, problem[2])
     if refused:  # such as a band with one side only
         return Line(refused, False)
-    mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
+    beside = [said for said in tidy.changes if said.endswith(LEFT_OUT)] if tidy else []
+    mended = tuple(told(said.removesuffix("left out") + "beside it") for said in beside)
+    if changes > len(beside):
+        mended += (iface_("mended for the computation: {:,}").format(changes - len(beside)),)
     try:
         mended += _held(tidy, repair) if tidy else ()
     except MeshError as error:

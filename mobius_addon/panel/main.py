@@ -46,9 +46,11 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
             if Job.refused is not None and Job.refused.title != MOBIUS_OT_transfer.job_title:
                 draw_refused(layout, context)
-            if settings.source is not None and len(selected_targets(context)) > 1:
-                several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
-                hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
+            # with another target chosen the selected meshes are what is to be joined
+            several = len(selected_targets(context)) > 1 and not (settings.target and selected_with(context, "source"))
+            if settings.source is not None and several:
+                button = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
+                hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
         draw_help(layout, context)
 
 

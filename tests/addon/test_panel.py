@@ -107,7 +107,7 @@ def test_the_line_under_a_picker() -> None:
     assert lines(cube, fill_holes=True) == ("closed, 8 vertices",)
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert lines(parts, largest_part=False) == ("2 separate parts:", "keep one, or turn on Largest Part")
-    assert lines(parts) == ("disc, 28 vertices", "mended for the computation: 1")
+    assert lines(parts) == ("disc, 28 vertices", "1 smaller part beside it")
 
 
 def test_what_a_disc_holds_badly_stands_there_before_it_is_aligned() -> None:
