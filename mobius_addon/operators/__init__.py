@@ -2,6 +2,7 @@
 
 from .. import viewport
 from ..handlers import unwatch, watch
+from ..jobs import Job
 from ..registration import register_factory
 from . import (
     align,
@@ -63,16 +64,24 @@ _register, _unregister = register_factory(
 def _forget(*_: object) -> None:
     align.forget_last()
     viewport.forget_views()
+    _forget_refused()
+
+
+def _forget_refused(*_: object) -> None:
+    Job.refused = None  # what it was about may be back
+
+
+_HANDLERS = (("load_post", _forget), ("undo_post", _forget_refused), ("redo_post", _forget_refused))
 
 
 def register() -> None:
     """Register the operators."""
     _register()
-    watch(("load_post", _forget))
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Undo `register`."""
-    unwatch(("load_post", _forget))
+    unwatch(*_HANDLERS)
     _forget()
     _unregister()

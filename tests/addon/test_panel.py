@@ -320,6 +320,10 @@ def test_the_panel_keeps_saying_why_work_came_to_nothing(
     monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Align", why, uids))
     bpy.context.scene.mobius.target = make_sheet("Another", 5)
     assert "align again" not in drawn(panel.MOBIUS_PT_main)
+    bpy.ops.ed.undo_push(message="one")
+    bpy.ops.ed.undo_push(message="two")
+    bpy.ops.ed.undo()
+    assert jobs.Job.refused is None
 
 
 # swap

@@ -95,6 +95,7 @@ def deleted(jobs: Any, names: tuple[str, str]) -> Wait:
     yield from until(lambda: names[1] in bpy.context.view_layer.objects)
     yield 0.5
     assert everything() == before
+    assert jobs.Job.refused is None, "the panel speaks of what is undone"
 
 
 def align(jobs: Any, names: tuple[str, str], samples: int, how: dict[str, Any] = QUICK) -> Wait:
