@@ -23,7 +23,7 @@ from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
 from .plate import NORMAL_WEIGHT, relaxed
-from .pose import in_pose, misfit, rigidly
+from .pose import ROUGHLY_BY, in_pose, misfit, rigidly, settled
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold import injective
 from .unfold_sphere import injective_on_sphere
@@ -172,7 +172,7 @@ def drafted(
     if start is None:
         flat, rest, growth = _best_start(flat, growth, places, believed, 1 / np.sqrt(whole.area), onto)
     else:
-        rest = in_pose(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
+        rest = settled(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
     unbent = whole.vertices * growth
     tell(0.0)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
@@ -199,12 +199,13 @@ def _best_start(
     for scale in (growth, same_area):
         scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
         for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
-            rest = in_pose(TriangleMesh(way, flat.faces), onto)
+            rest = in_pose(TriangleMesh(way, flat.faces), onto, most=ROUGHLY_BY)
             apart = misfit(TriangleMesh(rest, flat.faces), onto)
             if best is None or apart < least:
                 best, least = (scaled, rest, scale), apart
     assert best is not None
-    return best
+    scaled, rest, scale = best
+    return scaled, in_pose(TriangleMesh(rest, flat.faces), onto), scale
 
 
 def finished(

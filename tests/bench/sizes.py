@@ -73,7 +73,7 @@ def main() -> None:
             seconds, found = timed(pair.source, pair.target, AlignSettings(fill_holes=pair.openings), options.repeat)
             plain = faces((len(pair.source.faces), len(pair.target.faces)), store)
             clean, _ = timed(*plain, AlignSettings(), options.repeat)
-            said = ", ".join(found.remarks) or "no doubt"
+            said = ", ".join(dict.fromkeys(remark.kind for remark in found.remarks)) or "no doubt"
             print(f"  {seconds / clean:.2f} times two faces of that size; {said}", flush=True)
 
 
