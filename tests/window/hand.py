@@ -36,7 +36,7 @@ def until(happened: Any, every: float = 0.1) -> Wait:
 
 
 def picture(name: str, wait: float = 1.2) -> Wait:
-    """Take a picture after so many seconds, in which the window is drawn again and again: panels unfold step by step."""
+    """Take a picture after so many seconds, in which the window is drawn several times: panels unfold step by step."""
     for _ in range(math.ceil(wait / DRAWN)):
         yield min(wait, DRAWN)
     shot(str(SHOTS / f"{name}.png"))
