@@ -2,7 +2,7 @@
 
 from .. import viewport
 from ..handlers import unwatch, watch
-from ..jobs import Job
+from ..job import Job
 from ..registration import register_factory
 from . import (
     align,

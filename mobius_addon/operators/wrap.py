@@ -10,7 +10,8 @@ from ...solver.carry.fitted import Fitted, in_shape_of, wrapped
 from .. import stored_alignment
 from ..comparison import is_shown
 from ..fitting import reshaped_object, wrapped_object
-from ..jobs import JobOperator, Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import JobOperator, why_busy
 from ..mesh_data import Refusal, read_surface
 from ..usable import by_uid, is_deleted, why_not_aligned, why_not_mode
 from . import side_by_side

@@ -6,7 +6,8 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import topology_cache
-from ..jobs import Job, MOBIUS_OT_stop, describe_left, describe_proof
+from ..job import Job, describe_left, describe_proof
+from ..jobs import MOBIUS_OT_stop
 from ..operators.align import MOBIUS_OT_align
 from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check

@@ -10,7 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import stored_alignment
-from ..jobs import Job
+from ..job import Job
 
 
 class MobiusPanel:

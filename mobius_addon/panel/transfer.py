@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import stored_alignment
-from ..jobs import Job
+from ..job import Job
 from ..operators.select_unmatched import MOBIUS_OT_select_unmatched
 from ..operators.transfer import MOBIUS_OT_transfer
 from ..options import SOURCE_MASK_OPTIONS, TRANSFER_OPTIONS, draw_kinds, draw_transfer

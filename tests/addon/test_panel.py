@@ -16,6 +16,7 @@ from scenes import QUICK, make_object, make_sheet, positions
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import (  # noqa: E402
+    job,
     jobs,
     panel,
     preset_menus,
@@ -308,16 +309,16 @@ def test_the_panel_keeps_saying_why_work_came_to_nothing(
 ) -> None:
     uids = tuple(obj.session_uid for obj in pair)
     why = "'Target' was edited during the alignment: align again"
-    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Align", why, uids))
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Align", why, uids))
     assert "'Target' was edited during the alignment align again" in " ".join(drawn(panel.MOBIUS_PT_main))
     assert "align again" not in drawn(panel.MOBIUS_PT_transfer)
     bpy.context.scene.mobius.target = None  # as it is once the target is deleted
     assert "align again" in drawn(panel.MOBIUS_PT_main)
     bpy.context.scene.mobius.target = pair[1]
-    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Transfer", "'Source' has nothing: add some", uids[1:]))
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Transfer", "'Source' has nothing: add some", uids[1:]))
     assert "add some" in drawn(panel.MOBIUS_PT_transfer)
     assert "add some" not in drawn(panel.MOBIUS_PT_main)
-    monkeypatch.setattr(jobs.Job, "refused", jobs.Refused("Align", why, uids))
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Align", why, uids))
     bpy.context.scene.mobius.target = make_sheet("Another", 5)
     assert "align again" not in drawn(panel.MOBIUS_PT_main)
     bpy.ops.ed.undo_push(message="one")
