@@ -14,118 +14,22 @@ alone.
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
 from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Cancelled, MeshError, Progress
+from .job import Job, Refused, Work, describe_left, describe_proof
 from .mesh_data import Refusal
 from .registration import register_factory
 from .translation import told
 from .usable import by_uid, why_not_now
 
-Report = Callable[[Progress], bool | None]
-Work = Callable[[Report], Any]
-
 INTERVAL = 0.1
 """Seconds between looks at the worker."""
-
-
-SOON, EARLY = 1.0, 0.1
-"""Seconds, and the share of the work, before which nobody can say how long it will take."""
-
-
-class Job:
-    """A computation in a thread of its own.
-
-    Parameters
-    ----------
-    work : callable
-        Called with a progress callback; may touch arrays only, never bpy.
-    title : str
-        What it is, for the status bar.
-
-    Attributes
-    ----------
-    waits : str or None
-        What the finished result waits for before it is written.
-    told : int or None
-        Number of the workspace whose status bar speaks of it.
-    timer : bpy.types.Timer or None
-        What wakes its operator in the window.
-    """
-
-    current: ClassVar[Job | None] = None
-    """The one that runs in the window."""
-
-    def __init__(self, work: Work, title: str = "") -> None:
-        self.title = title
-        self.begun = time.monotonic()
-        self.progress = Progress(n_("Starting"), 0.0)
-        self.waits: str | None = None
-        self.told: int | None = None
-        self.timer: Any = None
-        self.result: Any = None
-        self.error: BaseException | None = None
-        self._work = work
-        self._stop = threading.Event()
-        # no daemon: at exit Python waits until it has noticed that it should stop, rather than pulling the rug
-        self._thread = threading.Thread(target=self._run, name="mobius")
-        self._thread.start()
-
-    def _run(self) -> None:
-        try:
-            self.result = self._work(self._note)
-        except BaseException as error:  # handed to the main thread, which reports it
-            self.error = error
-
-    def _note(self, progress: Progress) -> bool:
-        self.progress = progress
-        return not self._stop.is_set()
-
-    def cancel(self) -> None:
-        """Ask the work to stop at its next progress call."""
-        self._stop.set()
-
-    @property
-    def seconds_left(self) -> float | None:
-        """About how many seconds are left, if all goes on as it went; None where that cannot be said yet."""
-        spent, share = time.monotonic() - self.begun, self.progress.fraction
-        return spent * (1 - share) / share if spent > SOON and share > EARLY else None
-
-    @property
-    def cancelled(self) -> bool:
-        """Whether the work was asked to stop."""
-        return self._stop.is_set()
-
-    @property
-    def done(self) -> bool:
-        """Whether the thread has ended."""
-        return not self._thread.is_alive()
-
-
-def describe_proof(progress: Progress) -> str:
-    """Return what the search has proved so far, or nothing outside the search."""
-    if progress.value is None or progress.upper_bound is None:
-        return ""
-    gap = progress.upper_bound - progress.value
-    return iface_("{:.1f} of at most {:.1f}, gap {:.1f}").format(progress.value, progress.upper_bound, gap)
-
-
-def describe_left(job: Job) -> str:
-    """Return how long the work will take yet, or nothing where that cannot be said."""
-    left = job.seconds_left
-    if left is None or job.waits:
-        return ""
-    if left < 60:
-        return iface_("about {} s left").format(max(round(left), 1))
-    return iface_("about {} min left").format(round(left / 60))
 
 
 def why_busy() -> str | None:
@@ -175,6 +79,7 @@ class JobOperator:
         # a repeated operator belongs to Blender's list of those that are done: as a modal one it would be freed twice
         if in_window and not self.options.is_repeat:
             self._job = Job.current = Job(work, self.job_title)
+            Job.refused = None
             self._shown: tuple[str, int] | None = None
             self._job.timer = manager.event_timer_add(INTERVAL, window=context.window)
             manager.modal_handler_add(self)
@@ -216,7 +121,9 @@ class JobOperator:
             self.finish(context, self._job.result)
             redraw(context)
         except (Refusal, MeshError) as refusal:
-            return self._refused(refusal)
+            Job.refused = Refused(self.job_title, told(str(refusal)), self.objects_read)
+            # an error would pop up under the mouse, long after the click, and take the next key: an undo most likely
+            return self._refused(refusal, "WARNING")
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -244,7 +151,7 @@ class JobOperator:
 
     def _show(self, context: bpy.types.Context, progress: Progress) -> None:
         """Say in the status bar and the panel where the work is, if that is news."""
-        stage = iface_("Waiting") if self._job.waits else iface_(progress.stage)
+        stage = iface_("Waiting") if self._job.waits else told(progress.stage)
         now = ": ".join(filter(None, (iface_(self.job_title), stage, self._job.waits or describe_proof(progress))))
         left = describe_left(self._job)
         shown = f"{now}, {left}" if left else now, round(100 * progress.fraction)
@@ -263,8 +170,8 @@ class JobOperator:
         clear_status(self._job)
         redraw(context)
 
-    def _refused(self, error: Exception) -> set[str]:
-        self.report({"ERROR"}, told(str(error)))
+    def _refused(self, error: Exception, kind: str = "ERROR") -> set[str]:
+        self.report({kind}, told(str(error)))
         return {"CANCELLED"}
 
     def _stopped(self) -> set[str]:

@@ -47,35 +47,11 @@ def joined(objects: Sequence[bpy.types.Object], name: str) -> Iterator[tuple[bpy
     It has the place, the modifiers and the parent of the first. Groups, shape keys, UV maps, colors and materials of
     one name become one. All objects have to be in Object Mode and shown in the scene of the context.
     """
-    copies = []
+    copies = _copies(objects)
     offsets = dict.fromkeys(_DOMAINS, 0)
-    ranges: list[dict[str, range]] = []
-    for obj in objects:
-        copy = obj.copy()
-        copy.data = obj.data.copy()
-        copies.append(copy)
-        ranges.append({domain: _numbered(copy.data, domain, offsets) for domain in _DOMAINS})
-    whole = copies[0]
-    whole.name = name
-    collections = dict.fromkeys([bpy.context.scene.collection, *objects[0].users_collection])
-    for copy in copies:
-        bpy.context.scene.collection.objects.link(copy)
+    ranges = [{domain: _numbered(copy.data, domain, offsets) for domain in _DOMAINS} for copy in copies]
     turn = [_directions(obj) for obj in objects]
-    bpy.context.view_layer.update()
-    spare = [copy.data for copy in copies[1:]]
-    with (
-        quiet(),
-        bpy.context.temp_override(
-            active_object=whole, object=whole, selected_objects=copies, selected_editable_objects=copies
-        ),
-    ):
-        bpy.ops.object.join()
-    for mesh in spare:
-        if not mesh.users:
-            bpy.data.meshes.remove(mesh)
-    for collection in collections:
-        if whole.name not in collection.objects and collection.is_editable:
-            collection.objects.link(whole)
+    whole = _whole(copies, [bpy.context.scene.collection, *objects[0].users_collection], name)
     found = {domain: _taken_off(whole.data, domain) for domain in _DOMAINS}
     remember(whole, (), _written_on_all(objects))
     members = tuple(
@@ -89,6 +65,50 @@ def joined(objects: Sequence[bpy.types.Object], name: str) -> Iterator[tuple[bpy
         bpy.data.objects.remove(whole)
         if not mesh.users:
             bpy.data.meshes.remove(mesh)
+
+
+def joined_copy(objects: Sequence[bpy.types.Object], name: str) -> bpy.types.Object:
+    """Return a new object that Blender has joined of copies of mesh objects, in the collections of the first."""
+    return _whole(_copies(objects), objects[0].users_collection, name)
+
+
+def _copies(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Return copies of mesh objects, with meshes of their own."""
+    copies = []
+    for obj in objects:
+        copy = obj.copy()
+        copy.data = obj.data.copy()
+        copies.append(copy)
+    return copies
+
+
+def _whole(
+    copies: Sequence[bpy.types.Object], collections: Sequence[bpy.types.Collection], name: str
+) -> bpy.types.Object:
+    """Join copies of mesh objects to the first of them, which is put into these collections and gets the name."""
+    whole, first = copies[0], bpy.context.scene.collection
+    whole.name = name
+    for copy in copies:
+        first.objects.link(copy)
+    bpy.context.view_layer.update()
+    spare = [copy.data for copy in copies[1:]]
+    with (
+        quiet(),
+        bpy.context.temp_override(
+            active_object=whole, object=whole, selected_objects=copies, selected_editable_objects=copies
+        ),
+    ):
+        bpy.ops.object.join()
+    for mesh in spare:
+        if not mesh.users:
+            bpy.data.meshes.remove(mesh)
+    places = [collection for collection in dict.fromkeys(collections) if collection.is_editable]
+    for collection in places:
+        if whole.name not in collection.objects:
+            collection.objects.link(whole)
+    if places and first not in places:
+        first.objects.unlink(whole)
+    return whole
 
 
 def _written_on_all(objects: Sequence[bpy.types.Object]) -> list[tuple[str, str, str]]:

@@ -43,7 +43,7 @@ def announce(report: Callable[[set[str], str], None], target: bpy.types.Object, 
     for warning in plan.warnings:
         report({"WARNING"}, told(warning))
     text = rpt_("'{}' has {} from '{}'{}")
-    said = text.format(target.name, describe_counts(plan.counts()), source, plan.unmatched.remark())
+    said = text.format(target.name, told(describe_counts(plan.counts())), source, told(plan.unmatched.remark()))
     if plan.warnings:
         said += rpt_(" (warnings: {}, see Last Transfer)").format(len(plan.warnings))
     report({"WARNING" if plan.warnings else "INFO"}, said)

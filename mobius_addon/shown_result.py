@@ -12,7 +12,8 @@ import bpy
 
 from . import comparison, viewport
 from .handlers import unwatch, watch
-from .jobs import Job, redraw
+from .job import Job
+from .jobs import redraw
 from .operators import side_by_side
 
 

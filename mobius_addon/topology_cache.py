@@ -11,9 +11,11 @@ from bpy.app.translations import pgettext_n as n_
 
 from ..solver import Cleaned, MeshError, Topology, topology
 from ..solver.align.held import held
+from ..solver.surface.cleaning import LEFT_OUT
 from . import edits
 from .computation import Repair, in_order
 from .mesh_data import Surface, foreach, read_surface
+from .translation import told
 
 MAX_POLYGONS = 200_000
 """Larger meshes are checked when asked only, so that drawing the panel never takes noticeable time."""
@@ -21,7 +23,7 @@ MAX_POLYGONS = 200_000
 MAX_FLATTENED = 40_000
 """Triangles up to which the disc is looked at too, in 0.3 s of the processor; of others the button *Check* tells."""
 
-_HELD = {
+HELD = {
     "narrow": n_("long and narrow: less exact"),
     "deep": n_("deep: better cut out a piece"),
     "too deep": n_("too deep: a piece will be cut out"),
@@ -67,7 +69,7 @@ def line_of(obj: bpy.types.Object, repair: Repair) -> Line:
         try:
             store(obj, read_surface(obj), repair)
         except MeshError as error:
-            _lines[key] = Line(_rows(str(error).removeprefix(f"'{obj.name}' ")), False)
+            _lines[key] = Line(_rows(error, obj.name), False)
     return _lines[key]
 
 
@@ -99,7 +101,7 @@ def _line(surface: Surface, repair: Repair) -> Line:
         tidy = in_order(mesh, repair, surface.keys)
         mesh, changes = tidy.mesh, len(tidy.changes)
     except MeshError as error:
-        refused = _rows(str(error).removeprefix(f"'{mesh.name}' "))
+        refused = _rows(error, mesh.name)
     else:
         refused = None
     found = topology(mesh)
@@ -107,11 +109,14 @@ def _line(surface: Surface, repair: Repair) -> Line:
         return Line(problem[:2], False, True, problem[2])
     if refused:  # such as a band with one side only
         return Line(refused, False)
-    mended = (iface_("mended for the computation: {:,}").format(changes),) if changes else ()
+    beside = [said for said in tidy.changes if said.endswith(LEFT_OUT)] if tidy else []
+    mended = tuple(told(said.removesuffix("left out") + "beside it") for said in beside)
+    if changes > len(beside):
+        mended += (iface_("mended for the computation: {:,}").format(changes - len(beside)),)
     try:
         mended += _held(tidy, repair) if tidy else ()
     except MeshError as error:
-        return Line(_rows(str(error).removeprefix(f"'{mesh.name}' ")), False)
+        return Line(_rows(error, mesh.name), False)
     if not found.boundary_loops:
         return Line((iface_("closed, {:,} vertices").format(found.vertices), *mended), True, bool(changes))
     if openings := len(found.boundary_loops) - 1:
@@ -125,7 +130,7 @@ def _held(tidy: Cleaned, repair: Repair) -> tuple[str, ...]:
     if len(tidy.mesh.faces) > MAX_FLATTENED:
         return ()
     found = held(tidy, fill_holes=repair.fill_holes)
-    return () if found is None else (iface_(_HELD[found.kind]),)
+    return () if found is None else (iface_(HELD[found.kind]),)
 
 
 def _problem(found: Topology, repair: Repair) -> tuple[str, str, str] | None:
@@ -144,9 +149,11 @@ def _problem(found: Topology, repair: Repair) -> tuple[str, str, str] | None:
     return None
 
 
-def _rows(problem: str) -> tuple[str, ...]:
-    """Split what is wrong from what to do about it."""
-    return tuple(problem.split(": ", 1))
+def _rows(error: MeshError, name: str) -> tuple[str, ...]:
+    """Split what is wrong with a mesh, without its name, which stands above, from what to do about it."""
+    start, _, rest = told(str(error)).partition(name)
+    # the quotes are those of the language
+    return tuple((rest[1:].lstrip() if len(start) == 1 else start + name + rest).split(": ", 1))
 
 
 def _key(obj: bpy.types.Object, repair: Repair) -> tuple[int | str, ...]:

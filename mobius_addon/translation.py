@@ -20,24 +20,32 @@ def told(sentence: str) -> str:
     """Return a sentence of the solver, which knows no Blender, in the interface's language; as it is if nobody has it.
 
     The solver fills in names and figures itself: the sentence is recognised by the template it was made from. What is
-    filled in can be a sentence too, or several with commas between.
+    filled in can be a sentence too, or several with commas or semicolons between.
     """
     for template, pattern in _patterns():
         if found := pattern.fullmatch(sentence):
             names = (sentence[:start].endswith("'") for start, _ in found.regs[1:])
             parts = zip(found.groups(), names, strict=True)
             return rpt_(template).format(*(part if is_name else told(part) for part, is_name in parts))
-    listed = sentence.split(", ")
-    return ", ".join(map(told, listed)) if len(listed) > 1 else sentence
+    for between in ("; ", ", "):
+        listed = sentence.split(between)
+        if len(listed) > 1:
+            return between.join(map(told, listed))
+    return rpt_(sentence)
 
 
 @lru_cache(maxsize=1)
 def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     """Return the templates of sentences with what recognises them, the longest, which say most, first."""
     return tuple(
-        (template, re.compile(re.escape(template).replace(r"\{\}", "(.+?)"), re.DOTALL))
+        (template, re.compile(re.escape(template).replace(r"\{\}", _hole(template)), re.DOTALL))
         for template in sorted(GERMAN_SENTENCES, key=lambda text: -len(text.replace("{}", "")))
     )
+
+
+def _hole(template: str) -> str:
+    """Return what recognises that which is filled in; of a noun with its number that begins with a digit."""
+    return r"(\d.*?)" if template.startswith("{} ") and template.count("{") == 1 and ":" not in template else "(.+?)"
 
 
 def register() -> None:

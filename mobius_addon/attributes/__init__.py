@@ -22,8 +22,9 @@ from .active import ActiveLayers, note, persons_own
 from .carrier import Carrier
 from .masks import mask_names, mask_weights, piece_of
 from .plan import Carried, Transfer, restored_on_failure, write_transfers
+from .prepared import Reading
 from .preview import Preview, preview
-from .reading import Reading, plan_transfer, read_transfer
+from .reading import plan_transfer, read_transfer
 from .record import forget_written
 from .rig import armature_of
 from .settings import Mask, TransferSettings, split_names

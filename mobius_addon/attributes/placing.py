@@ -83,7 +83,7 @@ def kept_notes(target: str, kept: Iterable[tuple[str, str, str]]) -> list[str]:
     for kind, own, carried in kept:
         by_kind.setdefault(kind, []).append((own, carried))
     return [
-        f"'{target}' keeps its own {_noun(kind, len(pairs))} {_listed([own for own, _ in pairs])}: carried as "
+        f"'{target}' keeps its own {_noun(kind, len(pairs))} ({_listed([own for own, _ in pairs])}): carried as "
         f"{_listed([carried for _, carried in pairs])}"
         for kind, pairs in by_kind.items()
     ]

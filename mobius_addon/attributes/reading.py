@@ -1,216 +1,32 @@
-"""A transfer that is prepared: everything read first, then carried, and given its names on the target."""
+"""Everything that a transfer needs is read of both objects, before anything is carried."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 
 import bpy
-import numpy as np
 
-from ...solver import Cancelled, Progress
 from ...solver.surface.mesh import Floats
 from ..comparison import users_of
-from ..mesh_data import Refusal
-from ..textures.carrying import TextureReading
 from ..textures.reading import read_textures
-from .access import MAX_UV_MAPS, Layer
 from .carrier import Carrier, Values
 from .chosen import chosen_layers
 from .key_animation import left_behind
-from .key_set import KeyPlan, KeySet, key_set, planned
-from .key_sides import symmetric, with_halves
+from .key_set import key_set
+from .key_sides import with_halves
 from .layer_names import named_layers
-from .looks import Looks, looks_of
-from .missing import carried_without_missing, missing_warning
-from .mixing import changes, mixed, over
-from .placing import Place, holds_nothing, is_same, joins, kept_notes, replaced_notes
-from .plan import Carried, Transfer
+from .looks import looks_of
+from .placing import Place, joins
+from .plan import Transfer
+from .prepared import NothingThere, Pending, Reading, nothing
 from .record import Written, unedited
-from .rig import RigReading, read_rig
+from .rig import read_rig
 from .settings import TransferSettings
 from .shape_keys import ShapeKeyAccess, limited
-from .table import KINDS, RIDING, ROWS, Row
+from .table import RIDING, ROWS, Row
 from .unmatched import Unmatched
 from .vertex_groups import read_weights
-from .weights import tidied
-
-_LISTED = 3
-"""So many kinds of data are named where the source has none of them."""
-
-_LABELS = {kind.identifier: kind.label for kind in KINDS}
-
-
-@dataclass(frozen=True, eq=False)
-class _Pending:
-    """A layer that was read, who carries it, and where it can go."""
-
-    row: Row
-    carrier: Carrier
-    layer: Layer
-    place: Place
-
-
-class NothingThere(Refusal):
-    """The source has nothing of what is to be carried."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """Everything that a transfer needs of the two objects, as arrays: `carry` may run in a thread of its own."""
-
-    pending: tuple[_Pending, ...]
-    carrier: Carrier
-    settings: TransferSettings
-    influence: Floats | None
-    locked: Floats | None
-    looks: Looks
-    keys: tuple[KeySet | None, KeySet | None]
-    maps: frozenset[str]
-    warnings: tuple[str, ...]
-    names: tuple[str, str]
-    unmatched: Unmatched
-    textures: TextureReading | None = None
-    rig: RigReading | None = None
-    twins: Mapping[str, str] | None = None
-
-    def carry(self, progress: Callable[[Progress], bool | None] | None = None) -> Transfer:
-        """Carry every layer.
-
-        Raises
-        ------
-        Cancelled
-            The progress callback returned False.
-        NothingThere
-            Nothing is left to write.
-        Refusal
-            There are more UV maps than Blender allows.
-        """
-        warnings = list(self.warnings)
-        layers: list[tuple[_Pending, Carried]] = []
-        same = False
-        # pictures take longer than everything else
-        share = 1.0 if self.textures is None else 0.1
-        for number, pending in enumerate(self.pending):
-            row, name = pending.row, pending.layer.name
-            step = Progress(f"{_LABELS[row.kind]} of '{self.names[1]}'", share * number / len(self.pending))
-            if progress is not None and progress(step) is False:
-                raise Cancelled
-            carried, missing = self._carried(pending)
-            if row.marks:
-                # flags that most meshes have: no word about those that stay as they are
-                if not changes(carried, pending.place.there):
-                    same = True
-                    continue
-                if carried.name != name:
-                    warnings.append(f"'{self.names[1]}' has an attribute of another type named '{name}': delete it")
-                    continue
-            if missing:
-                warnings.append(missing_warning(row, name, self.names[0], missing))
-            layers.append((pending, carried))
-        if not layers and self.textures is None:
-            if same and not warnings:
-                raise NothingThere(
-                    f"'{self.names[1]}' has all of the chosen kinds that is on '{self.names[0]}' already"
-                )
-            raise NothingThere(_nothing(self.names[0], self.settings, warnings))
-        textures = None if self.textures is None else self.textures.carry(self._telling(progress, share))
-        warnings += () if textures is None else textures.notes
-        layers = self._tidied(layers)
-        if self.twins is not None:
-            carried_layers, more = symmetric([x for _, x in layers], self.twins, self.carrier.target.rest)
-            layers = [(pending, x) for (pending, _), x in zip(layers, carried_layers, strict=True)]
-            warnings += more
-        placed, notes = self._placed(layers)
-        settled, keys, more = self._settled(placed)
-        maps = self.maps | {x.name for x in settled if x.row.kind == "uv"}
-        if len(maps) > MAX_UV_MAPS:
-            raise Refusal(
-                f"'{self.names[1]}' would have {len(maps)} UV maps and Blender allows {MAX_UV_MAPS}: delete some first"
-            )
-        shown_uv, shown_color, others = self.looks.shown(settled, self.names)
-        warnings += [*notes, *more, *others, *self.unmatched.warnings(self.names[1])]
-        rig = None if self.rig is None else self.rig.carry()
-        return Transfer(tuple(settled), keys, shown_uv, shown_color, tuple(warnings), self.unmatched, textures, rig)
-
-    def _telling(
-        self, progress: Callable[[Progress], bool | None] | None, begun: float
-    ) -> Callable[[float], None] | None:
-        """Return what turns shares of the work on pictures into progress; it raises `Cancelled`."""
-        if progress is None:
-            return None
-
-        def tell(share: float) -> None:
-            step = Progress(f"{_LABELS['textures']} of '{self.names[1]}'", begun + share * (1 - begun))
-            if progress(step) is False:
-                raise Cancelled
-
-        return tell
-
-    def _carried(self, pending: _Pending) -> tuple[Carried, int]:
-        """Return a carried layer, and how many elements of the source have no number for it."""
-        row, settings, layer, place = pending.row, self.settings, pending.layer, pending.place
-        values, covered, missing = carried_without_missing(row, pending.carrier, layer.values)
-        share = np.ones(len(values))
-        if self.influence is not None:
-            share = self.carrier.at(row.access.domain, self.influence)
-        if row.mixes:
-            covered = covered & (share > 0)
-            values = mixed(values, place.there, settings.mix, settings.mix_factor * share)
-        else:
-            covered = covered & (share >= 0.5)
-        return Carried(row, layer.name, place.name, values, covered, layer.about), missing
-
-    def _tidied(self, layers: list[tuple[_Pending, Carried]]) -> list[tuple[_Pending, Carried]]:
-        groups = [x for _, x in layers if x.row.kind == "vertex-groups"]
-        if not groups:
-            return layers
-        columns = tidied(
-            np.clip(np.stack([np.where(x.covered, x.values, 0) for x in groups], axis=1), 0, 1),
-            np.any([x.covered for x in groups], axis=0),
-            smallest=self.settings.smallest_weight,
-            limit=self.settings.limit,
-            normalize=self.settings.normalize,
-            locked=self.locked,
-        )
-        done = iter([replace(x, values=column) for x, column in zip(groups, columns.T, strict=True)])
-        return [(pending, next(done) if x.row.kind == "vertex-groups" else x) for pending, x in layers]
-
-    def _placed(self, layers: list[tuple[_Pending, Carried]]) -> tuple[list[Carried], list[str]]:
-        """Return the layers under the names that they get, and sentences about what is kept or replaced."""
-        result, kept, lost = [], [], []
-        for pending, carried in layers:
-            row, place = pending.row, pending.place
-            there = place.there
-            same = is_same(row, carried.values, carried.covered, there, carried.about)
-            free = same or holds_nothing(row, there)
-            asked = self.settings.collisions == "replace" or joins(row, self.settings)
-            name = place.chosen(asked or free)
-            if row.once and not (asked or free or place.earlier):
-                lost.append(row.kind)
-            if name != place.name:
-                kept.append((row.kind, place.name, name))
-                assert there is not None
-                carried = over(carried, there)
-            own = same and not place.earlier and not holds_nothing(row, there)
-            result.append(replace(carried, name=name, own=own))
-        return result, [*kept_notes(self.names[1], kept), *replaced_notes(self.names[1], lost)]
-
-    def _settled(self, layers: list[Carried]) -> tuple[list[Carried], KeyPlan | None, list[str]]:
-        """Return the layers with shape keys that know their companions' names, and what becomes of all keys."""
-        source = self.keys[0]
-        if source is None or not any(x.row.kind == "shape-keys" for x in layers):
-            return layers, None, []
-        keys, groups = (
-            {x.source_name: x.name for x in layers if x.row.kind == kind} for kind in ("shape-keys", "vertex-groups")
-        )
-        sliders = [(x.source_name, x.name, x.about.renamed(keys, groups)) for x in layers if x.row.kind == "shape-keys"]
-        plan, notes = planned(source, self.keys[1], sliders, self.names[1])
-        return (
-            [replace(x, about=plan.sliders[x.name]) if x.row.kind == "shape-keys" else x for x in layers],
-            plan,
-            notes,
-        )
 
 
 def read_transfer(
@@ -267,7 +83,7 @@ def read_transfer(
             named, notes = named_layers(row.kind, layers, settings.spelling, mirrors, join=not settings.halves)
             warnings += notes
             read.append((row, way, [(replace(x, name=origin.get(x.name, x.name)), name) for x, name in named]))
-    pending: list[_Pending] = []
+    pending: list[Pending] = []
     reserved = {name for _, _, layers in read for _, name in layers}
     earlier = unedited(target, settings.kinds)
     for row, way, layers in read:
@@ -288,7 +104,7 @@ def read_transfer(
         for layer, name, wanted in found:
             place = _place(row, target, layer.name, name, there.get(name), earlier, reserved, wanted)
             reserved |= {x for x in (place.before, place.beside) if x is not None}
-            pending.append(_Pending(row, way, layer, place))
+            pending.append(Pending(row, way, layer, place))
     textures = None
     if "textures" in settings.kinds:
         textures = read_textures(
@@ -299,7 +115,7 @@ def read_transfer(
         rig, notes = read_rig(source, target, keys_carrier or carrier)
         warnings += notes
     if not pending and textures is None:
-        raise NothingThere(_nothing(source.name, settings, warnings))
+        raise NothingThere(nothing(source.name, settings, warnings))
     if users_of(target.data) > 1:
         warnings.append(f"'{target.name}' shares its mesh with other objects: they change with it")
     warnings += left_behind(source, target, [x.layer.name for x in pending if x.row.kind == "shape-keys"])
@@ -362,11 +178,3 @@ def _place(
     before = [x.name for x in ours if x.source_name == source_name and x.name not in reserved]
     beside = row.access.place(target, wanted, reserved, number=True)
     return Place(name, there, False, next(iter(before), None), beside)
-
-
-def _nothing(source: str, settings: TransferSettings, warnings: Iterable[str]) -> str:
-    nouns = [kind.noun for kind in KINDS if kind.identifier in settings.kinds]
-    wanted = " or ".join(nouns) if len(nouns) <= _LISTED else "layer of the chosen kinds"
-    which = {"all": "", "active": "active ", "named": "so named "}[settings.layers]
-    why = "; ".join(warnings)
-    return f"'{source}' has no {which}{wanted} to transfer" + (f" ({why})" if why else "")

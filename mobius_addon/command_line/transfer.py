@@ -80,7 +80,7 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from ...solver import report, save_map
-    from ..attributes.reading import NothingThere
+    from ..attributes.prepared import NothingThere
     from ..attributes.shares import write_shares
     from ..demo.pictures import require_cycles
     from ..files import Unreadable, outputs, require_room, write_mesh

@@ -2,6 +2,7 @@
 
 from .. import viewport
 from ..handlers import unwatch, watch
+from ..job import Job
 from ..registration import register_factory
 from . import (
     align,
@@ -14,6 +15,7 @@ from . import (
     example,
     flatten,
     heat_map,
+    join_copy,
     live,
     mend,
     point_pairs,
@@ -36,6 +38,7 @@ _register, _unregister = register_factory(
         flatten.MOBIUS_OT_flatten,
         swap.MOBIUS_OT_swap,
         use_selected.MOBIUS_OT_use_selected,
+        join_copy.MOBIUS_OT_join_copy,
         align.MOBIUS_OT_align,
         align_selected.MOBIUS_OT_align_selected,
         choose_target.MOBIUS_OT_choose_target,
@@ -61,16 +64,24 @@ _register, _unregister = register_factory(
 def _forget(*_: object) -> None:
     align.forget_last()
     viewport.forget_views()
+    _forget_refused()
+
+
+def _forget_refused(*_: object) -> None:
+    Job.refused = None  # what it was about may be back
+
+
+_HANDLERS = (("load_post", _forget), ("undo_post", _forget_refused), ("redo_post", _forget_refused))
 
 
 def register() -> None:
     """Register the operators."""
     _register()
-    watch(("load_post", _forget))
+    watch(*_HANDLERS)
 
 
 def unregister() -> None:
     """Undo `register`."""
-    unwatch(("load_post", _forget))
+    unwatch(*_HANDLERS)
     _forget()
     _unregister()

@@ -17,7 +17,8 @@ from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..computation import aligned
-from ..jobs import JobOperator, Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import JobOperator, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences

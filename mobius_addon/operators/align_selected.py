@@ -13,7 +13,8 @@ from .. import landmarks, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure
 from ..comparison import is_copy
 from ..computation import aligned
-from ..jobs import JobOperator, Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import JobOperator, why_busy
 from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences

@@ -5,11 +5,13 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...solver import MeshError, Topology, TriangleMesh, topology, verdict
-from ...solver.align.held import Held, held
+from ...solver.align.held import held
 from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface
@@ -49,7 +51,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
         """Report one sentence."""
         obj: Any = bpy.data.objects.get(self.object_name) if self.object_name else context.object
         if self.object_name and obj is None:
-            self.report({"ERROR"}, f"there is no object '{self.object_name}'")
+            self.report({"ERROR"}, told(f"there is no object '{self.object_name}'"))
             return {"CANCELLED"}
         if reason := why_not(obj, "mesh", context.scene, writes=False):
             self.report({"ERROR"}, reason)
@@ -65,16 +67,16 @@ class MOBIUS_OT_check(bpy.types.Operator):
         try:
             whole = verdict(mesh, largest_part=asked.largest_part, fill_holes=asked.fill_holes, keys=surface.keys)
         except MeshError as error:
-            line = f"'{obj.name}' cannot be used: it " + str(error).removeprefix(f"'{mesh.name}' ")
+            line = told(str(error))
         else:
-            line = f"'{obj.name}': {whole.describe()}"
-            badly = None
+            line = f"'{obj.name}': {told(whole.describe())}"
             try:
                 badly = held(whole.tidy, fill_holes=asked.fill_holes)
+                said = iface_(topology_cache.HELD[badly.kind]) if badly else ""
             except MeshError as error:
-                badly = Held("", "cannot be aligned: it " + str(error).removeprefix(f"'{mesh.name}' "))
-            if badly:
-                self.report({"WARNING"}, f"{line}; {badly.text}")
+                said = told(str(error))
+            if said:
+                self.report({"WARNING"}, f"{line}; {said}")
                 return {"FINISHED"}
             if not whole.repairs:
                 self.report({"INFO"}, line)
@@ -84,7 +86,8 @@ class MOBIUS_OT_check(bpy.types.Operator):
             hidden = select_vertices(obj.data, trouble)
             context.tool_settings.mesh_select_mode = (True, False, False)
             unseen = viewport.edit(context, obj) if self.edit else None
-            line += f" ({int(trouble.sum()) - hidden:,} vertices are selected: see them in Edit Mode)"
+            found_there = rpt_("{} ({:,} vertices are selected: see them in Edit Mode)")
+            line = found_there.format(line, int(trouble.sum()) - hidden)
             tell_unseen(self.report, obj.name, hidden, unseen)
         self.report({"WARNING"}, line)
         return {"FINISHED"}
@@ -143,4 +146,4 @@ def tell_unseen(report: Callable[[set[str], str], None], name: str, hidden: int,
     if unseen:
         report({"WARNING"}, unseen)
     if hidden:
-        report({"WARNING"}, f"'{name}' has {hidden:,} more that are hidden: reveal them in Edit Mode (Alt H)")
+        report({"WARNING"}, told(f"'{name}' has {hidden:,} more that are hidden: reveal them in Edit Mode (Alt H)"))

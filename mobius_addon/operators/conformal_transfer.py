@@ -9,7 +9,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...solver import Correspondence
 from .. import last_transfer, results, stored_alignment
 from ..attributes import SHARED_COLOR, SHARED_LAYOUT, restored_on_failure
-from ..jobs import Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import why_busy
 from ..mesh_data import Refusal, read_surface
 from ..options import (
     ALIGN_OPTIONS,

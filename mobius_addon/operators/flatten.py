@@ -67,15 +67,15 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
             color, known = shown.color(flattening)
             write_color(obj, shown.attribute, flat.tidy.at_vertices(color, 0), flat.tidy.at_vertices(known, False))
         for note in flat.notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, told(note))
         found = flattening.distortion
         flips = f", {found.flips} triangles turned over" if found.flips else ""
         colors = f"; its colors are in '{shown.attribute}'" if shown else ""
-        self.report(
-            {"INFO"},
+        said = (
             f"'{obj.name}' is flat in the UV map '{DISC_LAYOUT}': "
             f"angles are off by {found.mean_angle_error:.1f}° on average (at most {found.max_angle_error:.0f}°), "
             f"dilatation {found.mean_dilatation:.2f} (at most {found.max_dilatation:.1f}), "
-            f"lengths times {np.exp(found.min_log_factor):.2g} to {np.exp(found.max_log_factor):.2g}{flips}{colors}",
+            f"lengths times {np.exp(found.min_log_factor):.2g} to {np.exp(found.max_log_factor):.2g}{flips}{colors}"
         )
+        self.report({"INFO"}, told(said))
         return {"FINISHED"}

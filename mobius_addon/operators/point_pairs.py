@@ -13,6 +13,7 @@ from ...solver import MeshError
 from .. import point_pairs
 from ..jobs import redraw, why_busy
 from ..mesh_data import Refusal
+from ..translation import told
 from ..usable import why_not_aligned
 
 
@@ -42,7 +43,7 @@ class _OfPairs:
         try:
             done = point_pairs.bend(settings.source, settings.target, follow_all=self.follow_all)
         except (Refusal, MeshError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         kind, said = point_pairs.describe(*done)
         self.report({kind}, said)

@@ -60,5 +60,6 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
         number = plural(int(unmatched.sum()), "vertex")
         share = surfaces[1].mesh.vertex_areas[unmatched].sum() / surfaces[1].mesh.area
         verb = "has" if unmatched.sum() == 1 else "have"
-        self.report({"INFO"}, f"{number} of '{target.name}' ({share:.1%} of its area) {verb} no certain counterpart")
+        said = f"{number} of '{target.name}' ({share:.1%} of its area) {verb} no certain counterpart"
+        self.report({"INFO"}, told(said))
         return {"FINISHED"}

@@ -7,6 +7,7 @@ from ...solver import MeshError
 from ...solver.carry.inverse import inverted
 from .. import stored_alignment
 from ..mesh_data import Refusal, read_surface
+from ..translation import told
 from ..usable import why_not_pair
 
 
@@ -44,6 +45,6 @@ class MOBIUS_OT_swap(bpy.types.Operator):
             found = stored_alignment.load(target, source, surfaces)
             back = inverted(found, surfaces[0].mesh, surfaces[1].mesh)
         except (Refusal, MeshError, ValueError) as error:
-            return str(error)
+            return told(str(error))
         stored_alignment.store_inverse(source, target, back, surfaces)
         return None

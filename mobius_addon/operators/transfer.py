@@ -22,7 +22,8 @@ from ..attributes import (
 )
 from ..comparison import is_copy
 from ..evaluated import Shown, evaluated
-from ..jobs import JobOperator, Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import JobOperator, why_busy
 from ..mesh_data import Refusal, Surface, read_surface
 from ..options import TransferOptions, draw_kinds, draw_transfer, transfer_settings
 from ..usable import by_uid, why_not, why_not_aligned

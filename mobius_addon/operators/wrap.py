@@ -8,10 +8,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver.carry.fitted import Fitted, in_shape_of, wrapped
 from .. import stored_alignment
+from ..comparison import is_shown
 from ..fitting import reshaped_object, wrapped_object
-from ..jobs import JobOperator, Report, Work, why_busy
+from ..job import Report, Work
+from ..jobs import JobOperator, why_busy
 from ..mesh_data import Refusal, read_surface
 from ..usable import by_uid, is_deleted, why_not_aligned, why_not_mode
+from . import side_by_side
 
 
 class MOBIUS_OT_wrap(JobOperator, bpy.types.Operator):
@@ -66,6 +69,8 @@ class MOBIUS_OT_wrap(JobOperator, bpy.types.Operator):
             if obj is None or is_deleted(obj) or read_surface(obj).mesh.fingerprint != surface.mesh.fingerprint:
                 raise Refusal(rpt_("'{}' was removed or edited meanwhile: call it again").format(name))
         source, target = objects
+        if is_shown(context):  # what is new would not be seen
+            side_by_side.leave(context)
         onto = self.fitted == "source"
         make, surface = (wrapped_object, self._surfaces[0]) if onto else (reshaped_object, self._surfaces[1])
         made = make(source, target, surface, result)

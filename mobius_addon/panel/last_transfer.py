@@ -10,6 +10,7 @@ from ..attributes import KINDS
 from ..last_transfer import LastTransfer, LayerWritten
 from ..operators.try_expressions import MOBIUS_OT_try_expressions
 from ..playing import Play
+from ..translation import told
 from .place import MobiusPanel, draw_wrapped
 
 _NAMES = 8
@@ -43,7 +44,7 @@ class MOBIUS_PT_last_transfer(MobiusPanel, bpy.types.Panel):
             text = iface_("{:.1%} of the area is uncertain").format(found.uncertain)
             draw_wrapped(layout.column(align=True), context, text, "QUESTION")
         for sentence in found.warnings:
-            draw_wrapped(layout.column(align=True), context, sentence, "ERROR")
+            draw_wrapped(layout.column(align=True), context, told(sentence), "ERROR")
 
 
 def _found(context: bpy.types.Context) -> LastTransfer | None:

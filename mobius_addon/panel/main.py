@@ -6,18 +6,22 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import topology_cache
-from ..jobs import Job, MOBIUS_OT_stop, describe_left, describe_proof
+from ..job import Job, describe_left, describe_proof
+from ..jobs import MOBIUS_OT_stop
 from ..operators.align import MOBIUS_OT_align
 from ..operators.align_selected import MOBIUS_OT_align_selected, selected_targets
 from ..operators.check import MOBIUS_OT_check
+from ..operators.join_copy import MOBIUS_OT_join_copy, selected_with
 from ..operators.swap import MOBIUS_OT_swap
+from ..operators.transfer import MOBIUS_OT_transfer
 from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
+from ..translation import told
 from ..usable import why_not, why_not_written
 from .help import draw_help
 from .mending import draw_menu, draw_remedies
-from .place import MobiusPanel, beside_or_below, draw_sentence, draw_wrapped, hand_on
+from .place import MobiusPanel, beside_or_below, draw_refused, draw_sentence, draw_wrapped, hand_on
 
 
 class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
@@ -41,9 +45,13 @@ class MOBIUS_PT_main(MobiusPanel, bpy.types.Panel):
             column.scale_y = 1.4
             button = column.operator(MOBIUS_OT_align.bl_idname, icon="MOD_MESHDEFORM")
             hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
-            if len(selected_targets(context)) > 1:
-                several = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
-                hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, several)
+            if Job.refused is not None and Job.refused.title != MOBIUS_OT_transfer.job_title:
+                draw_refused(layout, context)
+            # with another target chosen the selected meshes are what is to be joined
+            several = len(selected_targets(context)) > 1 and not (settings.target and selected_with(context, "source"))
+            if settings.source is not None and several:
+                button = layout.operator(MOBIUS_OT_align_selected.bl_idname, icon="CON_FOLLOWTRACK")
+                hand_on((*ALIGN_OPTIONS, *SCAN_OPTIONS), settings, button)
         draw_help(layout, context)
 
 
@@ -77,6 +85,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if line.remedy:
         column.prop(settings, line.remedy, toggle=True)
     draw_remedies(column, obj, line)
+    if others := selected_with(context, role):
+        text = iface_("Join a Copy of {:,} Selected").format(len(others) + 1)
+        column.operator(MOBIUS_OT_join_copy.bl_idname, text=text, icon="AUTOMERGE_ON", translate=False).role = role
     if role == "target" and (reason := why_not_written(obj)):
         draw_sentence(column, context, reason, "LOCKED")
 
@@ -84,7 +95,7 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
 def _draw_job(layout: bpy.types.UILayout, job: Job) -> None:
     """Draw how far the work under way is, and what it has proved."""
     row = layout.row(align=True)
-    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else iface_(job.progress.stage))
+    row.progress(factor=job.progress.fraction, text=iface_("Waiting") if job.waits else told(job.progress.stage))
     row.operator(MOBIUS_OT_stop.bl_idname, text="", icon="X")
     # always two rows, so that what is below stays where it is
     layout.label(text=job.waits or describe_left(job) or iface_("ESC stops"), translate=False)

@@ -10,6 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import stored_alignment
+from ..job import Job
 
 
 class MobiusPanel:
@@ -75,6 +76,14 @@ def draw_sentence(layout: bpy.types.UILayout, context: bpy.types.Context, senten
     """Draw a sentence that may be too long for one row: what is wrong, then what to do about it."""
     for number, text in enumerate(sentence.split(": ", 1)):
         draw_wrapped(layout, context, text, "BLANK1" if number else icon)
+
+
+def draw_refused(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw why the last work came to nothing, if it was about what is chosen: the status bar says so for seconds."""
+    settings, refused = context.scene.mobius, Job.refused
+    chosen = settings.target or settings.source  # a target that was deleted is not chosen any more
+    if refused is not None and chosen is not None and chosen.session_uid in refused.objects:
+        draw_sentence(layout.column(align=True), context, refused.why, "ERROR")
 
 
 def draw_wrapped(

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ..proof import TERMS, shown
+from ..translation import told
 from ..verdict import judgement_of
 from .place import ReportPanel, draw_wrapped, report_of
 
@@ -40,4 +41,4 @@ class MOBIUS_PT_notes(ReportPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the sentences."""
         for sentence in judgement_of(report_of(context) or {}).notes:
-            draw_wrapped(self.layout.column(align=True), context, sentence, "DOT")
+            draw_wrapped(self.layout.column(align=True), context, told(sentence), "DOT")

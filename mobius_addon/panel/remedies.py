@@ -41,7 +41,7 @@ def draw_concerns(
     if found["coverage"] < ENOUGH:
         box = layout.box().column(align=True)
         text = iface_("{:.0%} of the target has no sure counterpart").format(1 - found["coverage"])
-        box.label(text=text, icon="QUESTION", translate=False)
+        draw_wrapped(box, context, text, "QUESTION")
         button = box.operator(MOBIUS_OT_select_unmatched.bl_idname, icon="RESTRICT_SELECT_OFF")
         hand_on(SOURCE_MASK_OPTIONS, settings, button)
         button.edit = True
@@ -55,7 +55,9 @@ def draw_concerns(
         _draw_button(box, settings, found, concern.kind)
         names = [name for name in OPTIONS.get(concern.kind, ()) if name not in drawn]
         for name in names:
-            box.prop(settings, name)
+            row = box.split(factor=0.5, align=True)
+            row.label(text=settings.bl_rna.properties[name].name)
+            row.prop(settings, name, text="")
         drawn |= set(names)
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import bpy
 
 from .. import stored_alignment
+from ..job import Job
 from ..operators.select_unmatched import MOBIUS_OT_select_unmatched
 from ..operators.transfer import MOBIUS_OT_transfer
 from ..options import SOURCE_MASK_OPTIONS, TRANSFER_OPTIONS, draw_kinds, draw_transfer
 from ..preset_menus import MOBIUS_PT_transfer_presets
 from ..transfer_preview import draw_preview
-from .place import MobiusPanel, MobiusSubPanel, hand_on
+from .place import MobiusPanel, MobiusSubPanel, draw_refused, hand_on
 
 
 class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
@@ -30,6 +31,8 @@ class MOBIUS_PT_transfer(MobiusSubPanel, bpy.types.Panel):
         column.enabled = pair is None or stored_alignment.why_stale(pair[1], pair[0]) is None
         draw_kinds(layout, settings, settings.source)
         hand_on(TRANSFER_OPTIONS, settings, column.operator(MOBIUS_OT_transfer.bl_idname, icon="MOD_DATA_TRANSFER"))
+        if Job.refused is not None and Job.refused.title == MOBIUS_OT_transfer.job_title:
+            draw_refused(layout, context)
 
 
 class MOBIUS_PT_transfer_settings(MobiusPanel, bpy.types.Panel):

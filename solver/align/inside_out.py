@@ -6,8 +6,6 @@ another surface of its kind it has: turned round it matches better.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..flatten.sphere import Flat
@@ -37,7 +35,7 @@ def turned_round(
     if _bulge(one) < 0 <= _bulge(two):
         one, two = two, one
     said = f"'{two.mesh.name}' seems to be inside out beside '{one.mesh.name}': turned for the computation only"
-    return replace(other, remarks=(Remark("done", said), *other.remarks)), turned
+    return other.annotated(remarks=(Remark("done", said), *other.remarks)), turned
 
 
 def _bulge(flattening: Flat) -> float:

@@ -6,8 +6,6 @@ each other the longer one need not be the same on both surfaces.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..flatten.flatten import Flattening
@@ -48,7 +46,7 @@ def with_other_rim(
         f"'{changed.original.name}': another opening than the longest taken for its outer boundary, with which it fits "
         "better, for the computation only"
     )
-    return replace(other, remarks=(Remark("done", said), *other.remarks)), source, target
+    return other.annotated(remarks=(Remark("done", said), *other.remarks)), source, target
 
 
 def _second(surface: Surface) -> tuple[float, int]:

@@ -121,7 +121,7 @@ def _with_main_parts(
             continue
         if again.mean_confidence > DOUBTFUL:
             said = "the largest parts do not belong together: others, which do, are taken for the main ones"
-            return replace(again, remarks=(Remark("other parts", said), *again.remarks)), (one, other), used
+            return again.annotated(remarks=(Remark("other parts", said), *again.remarks)), (one, other), used
     if found is None:
         assert reason is not None
         raise reason

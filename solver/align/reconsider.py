@@ -9,7 +9,6 @@ than any other by more than chance.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -159,7 +158,7 @@ def _fitting(score: float, least: float, found: Alignment, each: Hypothesis) -> 
 
 def _without_tie(found: Alignment) -> Alignment:
     """Return the alignment without a word about orientations that tie in the search: the bent maps decide."""
-    return replace(found, remarks=tuple(one for one in found.remarks if one.kind != "orientation"))
+    return found.annotated(remarks=tuple(one for one in found.remarks if one.kind != "orientation"))
 
 
 def _same(one: Floats, two: Floats) -> bool:
@@ -207,7 +206,7 @@ def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:
     if what:
         text = f"reconsidered: the best map of the search fits less well than {what}, which is taken"
         remarks = (Remark("reconsidered", text), *remarks)
-    return replace(found, remarks=(Remark("orientation", said), *remarks) if said else remarks)
+    return found.annotated(remarks=(Remark("orientation", said), *remarks) if said else remarks)
 
 
 def _ahead(bent: list[tuple[Alignment, str]]) -> tuple[Alignment, str]:

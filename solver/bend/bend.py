@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
 from .least_moved import unfolded
 from .plate import NORMAL_WEIGHT, SOLVER_STEPS, TENSION, relaxed
-from .pose import in_pose, misfit, rigidly
+from .pose import ROUGHLY_BY, in_pose, misfit, rigidly, settled
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold_sphere import injective_on_sphere
 
@@ -172,7 +173,7 @@ def drafted(
     if start is None:
         flat, rest, growth = _best_start(flat, growth, places, believed, 1 / np.sqrt(whole.area), onto)
     else:
-        rest = in_pose(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
+        rest = settled(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
     unbent = whole.vertices * growth
     tell(0.0)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
@@ -199,12 +200,13 @@ def _best_start(
     for scale in (growth, same_area):
         scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
         for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
-            rest = in_pose(TriangleMesh(way, flat.faces), onto)
+            rest = in_pose(TriangleMesh(way, flat.faces), onto, most=ROUGHLY_BY)
             apart = misfit(TriangleMesh(rest, flat.faces), onto)
             if best is None or apart < least:
                 best, least = (scaled, rest, scale), apart
     assert best is not None
-    return best
+    scaled, rest, scale = best
+    return scaled, in_pose(TriangleMesh(rest, flat.faces), onto), scale
 
 
 def finished(
@@ -238,17 +240,8 @@ def finished(
     used = np.flatnonzero(target.mesh.used)
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
     lengths = np.maximum(_lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:], FINEST)
-    now = relaxed(
-        draft.rest,
-        draft.now,
-        flat.faces,
-        onto,
-        lengths,
-        drawn[few.nodes],
-        lambda share: tell(0.5 * share),
-        TENSION,
-        SOLVER_STEPS,
-    )
+    taut = partial(relaxed, tension=TENSION, steps=SOLVER_STEPS)
+    now = taut(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
 
     tell(0.5)
     fine = coarse(target, FINE_NODES, order)
@@ -257,25 +250,15 @@ def finished(
     start = few.following(flat.vertices, draft.rest, unbent)[fine.nodes]
     lengths = np.full(FINE_ROUNDS, FINEST)
     drawn = drawn[fine.nodes]
-    settled = relaxed(
-        start,
-        followed,
-        fine.faces,
-        onto,
-        lengths,
-        drawn,
-        lambda share: tell(0.5 + 0.3 * share),
-        TENSION,
-        SOLVER_STEPS,
-    )
+    now = taut(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
     tell(0.8)
     exact = unbent
     if target.exact is not None:  # where smoothing has moved it along the surface it would go astray by as much
         exact = target.exact * ([-1, 1, 1] if order == [0, 2, 1] else [1, 1, 1]) * draft.growth
-    all_places = fine.following(unbent[fine.nodes], settled, exact)
+    all_places = fine.following(unbent[fine.nodes], now, exact)
     if exact is unbent:
-        all_places[fine.nodes] = settled
-    smooth = all_places if exact is unbent else fine.following(unbent[fine.nodes], settled, unbent)
+        all_places[fine.nodes] = now
+    smooth = all_places if exact is unbent else fine.following(unbent[fine.nodes], now, unbent)
     normals = TriangleMesh(smooth, draft.whole.faces).vertex_normals()
     face, barycentric = onto.nearest_point(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)

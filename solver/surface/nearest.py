@@ -123,7 +123,7 @@ class SurfacePoints:
         tree, face_of_sample = self._tree
         count = min(samples, len(face_of_sample))
         found = tree.query(
-            np.hstack([points, self.normal_weight * normals]), k=count, workers=-1 if len(points) > 2000 else 1
+            np.hstack([points, self.normal_weight * normals]), k=count, workers=-1 if len(points) > 1000 else 1
         )[1]
         return face_of_sample[np.asarray(found).reshape(len(points), count)]
 

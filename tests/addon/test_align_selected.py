@@ -7,7 +7,7 @@ from scenes import QUICK, corner_values, make_sheet
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import stored_alignment  # noqa: E402
-from mobius_extension.mobius_addon.jobs import Job  # noqa: E402
+from mobius_extension.mobius_addon.job import Job  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 
 

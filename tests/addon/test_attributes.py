@@ -221,7 +221,7 @@ def test_flags_that_the_target_has_already_are_not_said_to_be_missing() -> None:
     for obj in (source, target):
         obj.data.attributes.new("sharp_face", "BOOLEAN", "FACE").data[0].value = True
     settings = TransferSettings(kinds=("vertex-groups", "uv", "smoothness"))
-    with pytest.raises(Refusal, match="'Target' has all of the chosen kinds that is on 'Source' already"):
+    with pytest.raises(Refusal, match="'Target' already has everything of the chosen kinds that is on 'Source'"):
         plan_transfer(source, target, carrier(source, target), settings)
 
 

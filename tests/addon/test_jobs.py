@@ -10,7 +10,7 @@ from scenes import make_sheet
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import jobs  # noqa: E402
+from mobius_extension.mobius_addon import job, jobs  # noqa: E402
 from mobius_extension.solver import MeshError, Progress  # noqa: E402
 
 
@@ -66,8 +66,8 @@ class Operator(jobs.JobOperator):
         self.report = lambda kind, text: self.said.append((kind, text))
         self.wrong = error
 
-    def prepare(self, context: Any) -> jobs.Work:
-        def work(report: jobs.Report) -> str:
+    def prepare(self, context: Any) -> job.Work:
+        def work(report: job.Report) -> str:
             report(Progress("Searching", 0.25, 3.0, 4.0, 10))
             self.heard.set()
             self.free.wait(20)  # a long call that says nothing
@@ -179,7 +179,9 @@ def test_what_goes_wrong_in_the_thread_is_reported() -> None:
     operator.free.set()
     ended(operator)
     assert operator.modal(window, event("TIMER")) == {"CANCELLED"}
-    assert operator.said == [({"ERROR"}, "'Scan' is closed")]
+    # in the status bar: a popup would take the next key
+    assert operator.said == [({"WARNING"}, "'Scan' is closed")]
+    assert jobs.Job.refused == job.Refused("Test", "'Scan' is closed", ())
     operator = Operator(ZeroDivisionError("a fault of ours"))
     operator.execute(window)
     operator.free.set()

@@ -16,6 +16,7 @@ from scenes import QUICK, make_object, make_sheet, positions
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import (  # noqa: E402
+    job,
     jobs,
     panel,
     preset_menus,
@@ -107,7 +108,7 @@ def test_the_line_under_a_picker() -> None:
     assert lines(cube, fill_holes=True) == ("closed, 8 vertices",)
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert lines(parts, largest_part=False) == ("2 separate parts:", "keep one, or turn on Largest Part")
-    assert lines(parts) == ("disc, 28 vertices", "mended for the computation: 1")
+    assert lines(parts) == ("disc, 28 vertices", "1 smaller part beside it")
 
 
 def test_what_a_disc_holds_badly_stands_there_before_it_is_aligned() -> None:
@@ -219,7 +220,8 @@ def test_every_remark_stands_in_the_panel_with_its_remedy(
     rest = said[said.index("Side by Side") + 1 :]
     buttons = ("Take", "Search", "landmarks", "source_cut", "target_cut")
     assert [text for text in rest if text.startswith(buttons)] == offered
-    words = " ".join(text for text in rest if text not in offered)
+    labels = {"Landmarks", "Cut Source To", "Cut Target To"}
+    words = " ".join(text for text in rest if text not in {*offered, *labels})
     assert words == " ".join(one.text for one in found.concerns)
     assert panel.MOBIUS_PT_notes.poll(bpy.context) == bool(found.notes)
 
@@ -300,6 +302,29 @@ def test_work_under_way_takes_the_place_of_the_button(pair: tuple[Any, Any], mon
         assert not operator.poll()
     with pytest.raises(RuntimeError, match="Align is under way: press ESC to stop it"):
         bpy.ops.mobius.align()
+
+
+def test_the_panel_keeps_saying_why_work_came_to_nothing(
+    pair: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uids = tuple(obj.session_uid for obj in pair)
+    why = "'Target' was edited during the alignment: align again"
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Align", why, uids))
+    assert "'Target' was edited during the alignment align again" in " ".join(drawn(panel.MOBIUS_PT_main))
+    assert "align again" not in drawn(panel.MOBIUS_PT_transfer)
+    bpy.context.scene.mobius.target = None  # as it is once the target is deleted
+    assert "align again" in drawn(panel.MOBIUS_PT_main)
+    bpy.context.scene.mobius.target = pair[1]
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Transfer", "'Source' has nothing: add some", uids[1:]))
+    assert "add some" in drawn(panel.MOBIUS_PT_transfer)
+    assert "add some" not in drawn(panel.MOBIUS_PT_main)
+    monkeypatch.setattr(jobs.Job, "refused", job.Refused("Align", why, uids))
+    bpy.context.scene.mobius.target = make_sheet("Another", 5)
+    assert "align again" not in drawn(panel.MOBIUS_PT_main)
+    bpy.ops.ed.undo_push(message="one")
+    bpy.ops.ed.undo_push(message="two")
+    bpy.ops.ed.undo()
+    assert jobs.Job.refused is None
 
 
 # swap
@@ -443,7 +468,7 @@ def test_the_last_transfer_stands_in_the_panel_layer_by_layer(pair: tuple[Any, A
     assert "Group 0" not in said
     together = " ".join(said)
     assert "'Group 0' is locked on 'Target' and left as it is" in together
-    assert "'Target' keeps its own vertex group 'Right'" in together
+    assert "'Target' keeps its own vertex group ('Right')" in together
     bpy.ops.ed.undo()
     assert not panel.MOBIUS_PT_last_transfer.poll(bpy.context)
     bpy.context.scene.mobius.target.data.mobius_transferred = '{"layers": 3}'

@@ -142,7 +142,7 @@ def test_the_panel_says_whether_the_mesh_can_be_used_with_what_is_switched_on() 
     assert topology_cache.line_of(obj, Repair()).rows == ("3 boundary loops:", "2 will be filled")
     parts = make_sheet("Parts", 7, keep=lambda i, j: j != 2)
     assert topology_cache.line_of(parts, Repair(largest_part=False)).is_disc is False
-    rows = "disc, 28 vertices", "mended for the computation: 1"
+    rows = "disc, 28 vertices", "1 smaller part beside it"
     assert topology_cache.line_of(parts, Repair()).rows == rows
 
 

@@ -76,11 +76,11 @@ def test_layers_that_differ_stand_beside_the_target_s_own(sheets: Any) -> None:
     assert contents(target) == own
     assert contents(target, ".001") == given
     assert sorted(plan.warnings) == [
-        "'Target' keeps its own UV map 'UVMap': carried as 'UVMap.001'",
-        "'Target' keeps its own attributes 'Heat', 'Side': carried as 'Heat.001', 'Side.001'",
-        "'Target' keeps its own color attribute 'Paint': carried as 'Paint.001'",
-        "'Target' keeps its own shape key 'Smile': carried as 'Smile.001'",
-        "'Target' keeps its own vertex group 'Head': carried as 'Head.001'",
+        "'Target' keeps its own UV map ('UVMap'): carried as 'UVMap.001'",
+        "'Target' keeps its own attributes ('Heat', 'Side'): carried as 'Heat.001', 'Side.001'",
+        "'Target' keeps its own color attribute ('Paint'): carried as 'Paint.001'",
+        "'Target' keeps its own shape key ('Smile'): carried as 'Smile.001'",
+        "'Target' keeps its own vertex group ('Head'): carried as 'Head.001'",
     ]
     assert TransferSettings().collisions == "number"
 
@@ -245,7 +245,7 @@ def test_a_mix_and_a_mask_join_what_is_there(sheets: Any) -> None:
     plan = carry(source, target, collisions="number", mix="add")
     assert weights(target, "Head") == pytest.approx(0.75)
     assert (corner_values(target, "UVMap") == own).all()
-    assert "'Target' keeps its own UV map 'UVMap': carried as 'UVMap.001'" in plan.warnings
+    assert "'Target' keeps its own UV map ('UVMap'): carried as 'UVMap.001'" in plan.warnings
     half = positions(target)[:, 0] > 0
     add_group(target, "Half", half.astype(float))
     mask = Mask("named", "Half")

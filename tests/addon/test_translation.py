@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 import texts
+from scenes import make_object
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
-from mobius_extension.mobius_addon import translation  # noqa: E402
+from mobius_extension.mobius_addon import topology_cache, translation  # noqa: E402
+from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
 from mobius_extension.mobius_addon.german_sentences import GERMAN_SENTENCES  # noqa: E402
 
@@ -64,7 +66,7 @@ def test_every_stage_of_the_work_is_translated() -> None:
 def test_a_sentence_is_recognised_by_its_template(template: str) -> None:
     german = GERMAN_SENTENCES[template]
     assert holes(template) == holes(german)
-    given = [f"X{number}" for number in range(holes(template))]
+    given = [f"{number}X" for number in range(holes(template))]
     assert translation.told(template.format(*given)) == german.format(*given)
 
 
@@ -76,6 +78,25 @@ def test_what_is_filled_in_is_translated_too_but_no_name() -> None:
         "„source“: 12 Flächen umgedreht, 2 Öffnungen (8, 9 Kanten) geschlossen, nur für die Berechnung"
     )
     assert translation.told("nobody has translated this, nor that") == "nobody has translated this, nor that"
+
+
+def test_what_a_transfer_says_is_translated() -> None:
+    nothing = "'A, B' has no active vertex groups or UV maps to transfer ('Chin' is locked on 'B' and left as it is)"
+    assert translation.told(nothing) == (
+        "„A, B“ hat keine aktiven Punktgruppen oder UV-Maps zum Übertragen "
+        "(„Chin“ ist auf „B“ gesperrt und bleibt, wie es ist)"
+    )
+    kept = "'Target' keeps its own attributes ('Heat', 'Side'): carried as 'Heat.001', 'Side.001'"
+    assert "behält Eigenes, Eigenschaften ('Heat', 'Side'): übertragen als 'Heat.001'" in translation.told(kept)
+    left = "2,000 vertices of 'B' (3.0% of its area) have no certain counterpart and are left as they were"
+    assert translation.told(left).startswith("2,000 Punkte von „B“ (3.0% der Fläche) haben kein sicheres Gegenstück")
+    assert translation.told("1 vertex group, 12 UV maps") == "1 Punktgruppe, 12 UV-Maps"
+    assert translation.told("Vertex Groups of 'B'") == "Punktgruppen von „B“"
+
+
+def test_what_is_wrong_with_a_mesh_is_translated_without_its_name() -> None:
+    empty = make_object("Points", [(0, 0, 0), (1, 0, 0)], [])
+    assert topology_cache.line_of(empty, Repair()).rows == ("hat keine Flächen",)
 
 
 def blenders_own() -> dict[str, set[str]]:

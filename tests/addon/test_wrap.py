@@ -124,3 +124,13 @@ def test_it_says_what_is_in_the_way(pair: tuple[Any, Any]) -> None:
     with pytest.raises(RuntimeError, match="has been edited since it was aligned"):
         bpy.ops.mobius.wrap()
     assert len(bpy.data.objects) == 2
+
+
+def test_a_new_object_is_seen_where_both_were_shown_side_by_side(bent: tuple[Any, Any]) -> None:
+    bpy.ops.mobius.align(**QUICK)
+    assert bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert "Mobius Side by Side" in bpy.context.scene.collection.children
+    assert bpy.ops.mobius.wrap("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert "Mobius Side by Side" not in bpy.context.scene.collection.children
+    assert bpy.context.selected_objects == [made()]
+    assert made().name == "Source on Target"

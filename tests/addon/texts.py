@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,12 @@ def of_code() -> set[str]:
 
 
 def _calls(path: Path) -> Iterator[ast.Call]:
-    return (x for x in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(x, ast.Call))
+    return (x for x in ast.walk(_tree(path)) if isinstance(x, ast.Call))
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def constants(node: ast.AST) -> Iterator[str]:
@@ -65,21 +71,63 @@ def constants(node: ast.AST) -> Iterator[str]:
             yield from constants(value)
 
 
+OF_FILES = {"demo", "command_line", "files", "collection"}
+"""Folders whose sentences are for those who read English, as those about damaged data are."""
+
+SAYING = {"attributes", "textures"}
+"""Folders of the add-on in which every sentence is read by an artist, as a refusal or as a warning."""
+
+
 def of_sentences() -> set[str]:
     """Templates of what the solver refuses and what the add-on refuses or reports without Blender's own translation.
 
-    What is filled in is {}. Errors of the command line, of files and of damaged data are for those who read English.
+    What is filled in is {}.
     """
     found: set[str] = set()
-    for folder, errors in (("solver", ("MeshError",)), ("mobius_addon", ("Refusal",))):
+    errors = artists_errors()
+    for folder in ("solver", "mobius_addon"):
         for path in sorted((ROOT / folder).glob("**/*.py")):
-            if set(path.parts) & {"demo", "command_line", "files", "collection"} or path.name.startswith("german"):
+            if set(path.parts) & OF_FILES or path.name.startswith("german"):
                 continue
             for call in _calls(path):
                 name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
                 said = call.args[:1] if name in errors else call.args[1:2] if name in ("report", "_report") else []
                 found |= {text for argument in said for text in _templates(argument)}
+            if path.parent.name in SAYING:
+                found |= _said(_tree(path))
     return {text for text in found if text.count(" ") > 2}
+
+
+def artists_errors() -> set[str]:
+    """Names of the exceptions that operators report to an artist: the two that they catch and all of these."""
+    parents: dict[str, set[str]] = {}
+    for folder in ("solver", "mobius_addon"):
+        for path in (ROOT / folder).glob("**/*.py"):
+            for node in ast.walk(_tree(path)):
+                if isinstance(node, ast.ClassDef):
+                    parents[node.name] = {x.id for x in node.bases if isinstance(x, ast.Name)}
+    found, more = set(), {"Refusal", "MeshError"}
+    while more:
+        found |= more
+        more = {name for name, own in parents.items() if own & found} - found
+    # whose text goes on after a layout's name, in a Refusal
+    return found | {"LayoutError"}
+
+
+def _said(tree: ast.Module) -> set[str]:
+    """Every sentence of a module but docstrings, and what is for programmers or in the catalogue of the interface."""
+    aside: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            aside.add(id(node.value))
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            if node.func.id in {"ValueError", "AssertionError", "Kind", *TRANSLATED}:
+                aside |= {id(inner) for argument in node.args for inner in ast.walk(argument)}
+        elif isinstance(node, ast.JoinedStr):  # as a whole
+            aside |= {id(inner) for part in node.values for inner in (part, getattr(part, "format_spec", None))}
+    texts = (x for x in ast.walk(tree) if isinstance(x, ast.Constant | ast.JoinedStr) and id(x) not in aside)
+    # attributes have names that no language changes
+    return {text for node in texts for text in _templates(node) if not text.startswith("Mobius ")}
 
 
 def _templates(node: ast.AST) -> Iterator[str]:

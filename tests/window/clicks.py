@@ -21,7 +21,7 @@ from mathutils import Euler, Vector
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
-Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 
 
 def steps() -> Wait:
@@ -109,7 +109,9 @@ def steps() -> Wait:
     yield from picture("discs")
     bpy.context.space_data.show_region_ui = True
     bpy.context.preferences.view.language = "de_DE"
+    yield 1.0
     yield from picture("german")
+    assert region("UI").width > 1, "the panel is not to be seen"
     bpy.context.preferences.view.language = "en_US"
     yield 0.5
 
@@ -133,7 +135,7 @@ def steps() -> Wait:
     yield 1.0
     assert Job.current is None, "the work goes on after its file was closed"
     assert not bpy.context.window_manager.mobius_view.discs
-    yield from showing.opened(names)
+    yield from showing.opened(PACKAGE, names)
     print("[clicks] done", flush=True)
 
 

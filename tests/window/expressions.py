@@ -15,7 +15,7 @@ from hand import Wait, click_on, escape, find, picture, pointer, redo, turn_view
 from mathutils import Euler
 
 vars(hand).update(region=region, click=click, shot=shot)
-Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 playing = importlib.import_module(PACKAGE + ".mobius_addon.playing")
 Play, strength_at = playing.Play, playing.strength_at
 panels = importlib.import_module(PACKAGE + ".mobius_addon.panel")

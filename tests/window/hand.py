@@ -3,6 +3,7 @@
 `region`, `click` and `shot` are the driver's, which `clicks.py` hands on.
 """
 
+import math
 import os
 import subprocess
 import time
@@ -15,6 +16,9 @@ import bpy
 SHOTS = Path(os.environ["MOBIUS_SHOTS"])
 STEP = 12
 """Pixels between places where a button is looked for; a row is twenty high."""
+
+DRAWN = 0.4
+"""Seconds after which the window is drawn again."""
 
 Wait = Iterator[float]
 
@@ -32,7 +36,9 @@ def until(happened: Any, every: float = 0.1) -> Wait:
 
 
 def picture(name: str, wait: float = 1.2) -> Wait:
-    yield wait
+    """Take a picture after so many seconds, in which the window is drawn several times: panels unfold step by step."""
+    for _ in range(math.ceil(wait / DRAWN)):
+        yield min(wait, DRAWN)
     shot(str(SHOTS / f"{name}.png"))
 
 

@@ -12,7 +12,7 @@ from hand import Wait, click_on, escape, find, picture, until
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
-Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 
 FACES = 100_000
 """Triangles that the demo's heads are brought to."""

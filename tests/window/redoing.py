@@ -25,17 +25,9 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     searches: list[int] = []
     computed = align.aligned
     align.aligned = lambda *given, **options: (searches.append(1), computed(*given, **options))[1]
-    group = bpy.data.objects[names[0]].vertex_groups[0].name
 
     def weight() -> float:
-        """Return the sum of the weights that the target has of the source's first group; -1 without the group."""
-        target = bpy.data.objects[names[1]]
-        if group not in target.vertex_groups:
-            return -1.0
-        index = target.vertex_groups[group].index
-        return sum(
-            member.weight for vertex in target.data.vertices for member in vertex.groups if member.group == index
-        )
+        return weight_of(names)
 
     def reaches(wanted: float) -> Any:
         return lambda: jobs.Job.current is None and abs(weight() - wanted) < 0.02 * abs(wanted)
@@ -74,6 +66,35 @@ def steps(package: str, names: tuple[str, str]) -> Wait:
     bpy.ops.mobius.align("EXEC_DEFAULT", True)
     bpy.ops.mobius.transfer("EXEC_DEFAULT", True)
     yield 1.0
+
+
+def after_opening(package: str, names: tuple[str, str]) -> Wait:
+    """Transfer by the result that a file was saved with, answer the redo panel, and take it back."""
+    jobs = importlib.import_module(package + ".mobius_addon.jobs")
+    bpy.data.objects[names[1]].vertex_groups.clear()
+    bpy.ops.ed.undo_push(message="no groups")
+    yield from click_on((yield from find("bpy.ops.mobius.transfer", upwards=True)))
+    yield from until(lambda: jobs.Job.current is None and weight_of(names) > 0)
+    yield 1.0
+    whole = weight_of(names)
+    yield from show_panel()
+    yield from set_factor(panel_rows(), 0.5)
+    yield from quickly(
+        lambda: abs(weight_of(names) - 0.5 * whole) < 0.02 * whole, "transfer in an opened file, redo panel"
+    )
+    yield from picture("reopened-redo")
+    undo()
+    yield from until(lambda: weight_of(names) == -1)
+
+
+def weight_of(names: tuple[str, str]) -> float:
+    """Return the sum of the weights that the target has of the source's first group; -1 without the group."""
+    source, target = (bpy.data.objects[name] for name in names)
+    group = source.vertex_groups[0].name
+    if group not in target.vertex_groups:
+        return -1.0
+    index = target.vertex_groups[group].index
+    return sum(member.weight for vertex in target.data.vertices for member in vertex.groups if member.group == index)
 
 
 def every_way_to_redo(name: str, run: Any, weight: Any, reaches: Any) -> Wait:

@@ -5,6 +5,7 @@ import shutil
 from typing import Any
 
 import bpy
+import redoing
 from hand import SHOTS, Wait, over_the_viewport, picture, pointer, until
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
@@ -72,8 +73,9 @@ def saved_while_shown(names: tuple[str, str]) -> Wait:
     other.unlink()
 
 
-def opened(names: tuple[str, str]) -> Wait:
-    """Open the file that was saved meanwhile: it shows everything, and what was selected."""
+def opened(package: str, names: tuple[str, str]) -> Wait:
+    """Open the file that was saved meanwhile: it shows everything and what was selected, and its result still holds."""
+    stored = importlib.import_module(package + ".mobius_addon.stored_alignment")
     bpy.ops.wm.open_mainfile(filepath=str(SAVED))
     yield 1.0
     assert not is_alone()
@@ -81,6 +83,15 @@ def opened(names: tuple[str, str]) -> Wait:
     assert set(names) <= {obj.name for obj in bpy.context.visible_objects}
     assert bpy.context.space_data.shading.color_type != "VERTEX"
     SAVED.unlink()
+    source, target = (bpy.data.objects[name] for name in names)
+    assert stored.exists(target, source)
+    assert stored.why_stale(target, source) is None
+    yield from picture("reopened")
+    bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield from until(is_alone)
+    bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
+    yield from until(lambda: not is_alone())
+    yield from redoing.after_opening(package, names)
 
 
 def is_alone() -> bool:

@@ -12,7 +12,7 @@ from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointe
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
-Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 comparison = importlib.import_module(PACKAGE + ".mobius_addon.comparison")
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}

@@ -22,7 +22,8 @@ PICTURES = {
     "clicks": (
         *("chosen", "searching", "aligned", "transferred", "matches", "heat-map-confidence", "heat-map-dilatation"),
         *("heat-map-factor", "side-by-side", "discs", "german"),
-        *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "shown", "cleared"),
+        *("redo-transfer", "redo-conformal-transfer", "waiting", "written-after-waiting", "deleted-meanwhile"),
+        *("shown", "cleared", "reopened", "reopened-redo"),
     ),
     "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
     "pairing": ("point-pairs",),

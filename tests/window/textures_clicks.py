@@ -15,7 +15,7 @@ from mathutils import Euler, Vector
 
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
-Job = importlib.import_module(PACKAGE + ".mobius_addon.jobs").Job
+Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
 

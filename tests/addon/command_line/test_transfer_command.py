@@ -158,7 +158,7 @@ def test_the_target_keeps_its_own_uv_map_and_a_second_run_adds_nothing(
     scans: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     own = textured_target(scans / "cloth.blend")
-    said = "mobius: warning: 'Cloth' keeps its own UV map 'UVMap': carried as 'UVMap.001'\n"
+    said = "mobius: warning: 'Cloth' keeps its own UV map ('UVMap'): carried as 'UVMap.001'\n"
     given = scans / "cloth.blend"
     for out in (scans / "first.blend", scans / "second.blend"):
         status, _, err = run(capsys, "transfer", scans / "source.blend", given, "-o", out, "--only", "uv", *QUICK)

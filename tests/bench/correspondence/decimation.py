@@ -1,5 +1,8 @@
 """Other triangles: Blender's edge collapse, as a user's low resolution copy would have it, and vertices elsewhere."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from solver import TriangleMesh, topology
@@ -7,6 +10,29 @@ from solver import TriangleMesh, topology
 
 def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
     """Return the mesh with that share of its triangles, by the collapse mode of Blender's Decimate modifier."""
+
+    def collapse(modifiers: Any) -> None:
+        modifier = modifiers.new("decimate", "DECIMATE")
+        modifier.ratio = share
+        modifier.use_collapse_triangulate = True
+
+    return _modified(mesh, collapse)
+
+
+def resized(mesh: TriangleMesh, triangles: int) -> TriangleMesh:
+    """Return the mesh with about that many triangles, subdivided smoothly where it has fewer, then collapsed."""
+
+    def subdivide(modifiers: Any) -> None:
+        modifiers.new("subdivide", "SUBSURF").levels = 1
+        modifiers.new("triangulate", "TRIANGULATE")
+
+    while len(mesh.faces) < triangles:
+        mesh = _modified(mesh, subdivide)
+    return decimated(mesh, triangles / len(mesh.faces))
+
+
+def _modified(mesh: TriangleMesh, modify: Callable[[Any], None]) -> TriangleMesh:
+    """Return the mesh as Blender's modifiers, which `modify` adds to a stack, make it."""
     import bpy  # takes a second, and is not needed where the result is kept
 
     size = 1 / np.sqrt(mesh.area)  # Blender's positions are single precision
@@ -15,9 +41,7 @@ def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
     data.from_pydata(((mesh.vertices - middle) * size).tolist(), [], mesh.faces.tolist())
     thing = bpy.data.objects.new("decimated", data)
     bpy.context.scene.collection.objects.link(thing)
-    modifier = thing.modifiers.new("decimate", "DECIMATE")
-    modifier.ratio = share
-    modifier.use_collapse_triangulate = True
+    modify(thing.modifiers)
     evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
     result = evaluated.to_mesh()
     vertices = np.empty(3 * len(result.vertices), np.float32)
