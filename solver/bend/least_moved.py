@@ -42,7 +42,7 @@ def unfolded(
     vertices, bent : (n_source, 3), (n, 3) float64
         The source's vertices, and where the target's were bent to, in one frame.
     """
-    best, least = None, np.inf
+    best, least, count = None, np.inf, 0
     for way in _ways(carried, conformal, faces, source, target, vertices, bent):
         trial, _ = injective(way, conformal, faces, target.boundary, target.holes, tell)
         moved = np.flatnonzero(np.abs(trial - carried) > 0)

@@ -19,7 +19,7 @@ def test_no_other_order_is_nearer(seed: int, way: int):
     angle = np.sort(rng.uniform(-3, 3, 9))
     rim = Rim(np.exp(1j * way * angle), rng.normal(size=(9, 3)))
     conformal = np.exp(1j * way * np.linspace(-2.5, 2.5, 4))
-    carried = 0.9 * np.exp(1j * way * rng.uniform(-2.5, 2.5, 4))
+    carried = np.exp(-0.1 + 1j * way * rng.uniform(-2.5, 2.5, 4))
     bent, offset = rng.normal(size=(4, 3)), np.full(4, 0.5)
     found = rim.ordered(carried, conformal, bent, offset)
 
