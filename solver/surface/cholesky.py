@@ -38,8 +38,11 @@ LEAF = 100
 
 def factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
     """Return the solver, for (n,) and (n, k), of a sparse symmetric positive definite system."""
-    if matrix.indptr.size - 1 >= LARGE:
-        return nested_dissection_cholesky(matrix)
+    return (superlu if matrix.indptr.size - 1 < LARGE else nested_dissection_cholesky)(matrix)
+
+
+def superlu(matrix: csc_array) -> Callable[[Floats], Floats]:
+    """Return the solver, for (n,) and (n, k), of a sparse symmetric positive definite system."""
     # columns one by one: the factors of surfaces are too sparse for SuperLU's panels to pay
     options = {"SymmetricMode": True}
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, relax=1, panel_size=1, options=options).solve

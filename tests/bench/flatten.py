@@ -27,7 +27,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "solver")]
 
 from mesh_files import read_mesh  # noqa: E402
 from scipy.sparse import csc_array, csc_matrix, csr_matrix  # noqa: E402
-from scipy.sparse.linalg import splu  # noqa: E402
 
 from solver import (  # noqa: E402
     Mobius,
@@ -39,7 +38,7 @@ from solver.flatten.barycentre import conformal_barycentre  # noqa: E402
 from solver.flatten.distortion import Distortion, angle_errors, distortion  # noqa: E402
 from solver.flatten.flatten import _surface  # noqa: E402
 from solver.flatten.harmonic import _dirichlet_systems  # noqa: E402
-from solver.surface.cholesky import nested_dissection_cholesky  # noqa: E402
+from solver.surface.cholesky import nested_dissection_cholesky, superlu  # noqa: E402
 from solver.surface.intrinsic_delaunay import without_chords  # noqa: E402
 
 TARGETS = {"human_face": 1.21, "chinese_lion": 1.42, "human_brain": 1.46}
@@ -89,10 +88,6 @@ def finer(mesh: TriangleMesh, faces: int) -> TriangleMesh:
 def dirichlet_matrix(mesh: TriangleMesh) -> csc_array:
     boundary = topology(mesh).boundary_loops[0]
     return _dirichlet_systems(without_chords(_surface(mesh, ()), boundary), boundary)[1]
-
-
-def superlu(matrix: csc_array) -> Callable[[np.ndarray], np.ndarray]:
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve
 
 
 def libigl_maps(mesh: TriangleMesh) -> dict[str, Callable[[], np.ndarray]]:
