@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -22,10 +23,10 @@ from ..surface.mesh import Booleans, Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
-from .plate import NORMAL_WEIGHT, relaxed
+from .least_moved import unfolded
+from .plate import NORMAL_WEIGHT, SOLVER_STEPS, TENSION, relaxed
 from .pose import ROUGHLY_BY, in_pose, misfit, rigidly, settled
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
-from .unfold import injective
 from .unfold_sphere import injective_on_sphere
 
 NODES = 1500
@@ -35,13 +36,13 @@ FINE_NODES = 6000
 """Target vertices of the last rounds, which put right what depends on single triangles (folds fall to a half)."""
 
 STIFFEST, SOFTEST, ROUNDS = 0.5, 0.005, 20
-"""The wavelength below which the plate resists, from half the width of the surface to some edges of a scan."""
+"""The wavelength over 2 pi below which the plate resists: from half the width of the surface to some edges."""
 
 DRAFT_ROUNDS = 10
 """Rounds before boundaries attract each other; by then it is clear which of them correspond."""
 
-FINE_STIFFNESS, FINE_ROUNDS = 0.01, 3
-"""The wavelength at which the last rounds begin."""
+FINEST, FINE_ROUNDS = 0.01, 3
+"""The least such wavelength after the draft: two and a half distances between nodes, which carry no shorter waves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,25 +239,26 @@ def finished(
     drawn = np.ones(len(target.places), bool) if alike is None else alike
     used = np.flatnonzero(target.mesh.used)
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
-    lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:]
-    now = relaxed(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
+    lengths = np.maximum(_lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:], FINEST)
+    taut = partial(relaxed, tension=TENSION, steps=SOLVER_STEPS)
+    now = taut(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
 
     tell(0.5)
     fine = coarse(target, FINE_NODES, order)
     tell(0.5)
     followed = few.following(flat.vertices, now, unbent)[fine.nodes]
     start = few.following(flat.vertices, draft.rest, unbent)[fine.nodes]
-    lengths = _lengths(FINE_STIFFNESS, SOFTEST, FINE_ROUNDS)
+    lengths = np.full(FINE_ROUNDS, FINEST)
     drawn = drawn[fine.nodes]
-    settled = relaxed(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
+    now = taut(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
     tell(0.8)
     exact = unbent
     if target.exact is not None:  # where smoothing has moved it along the surface it would go astray by as much
         exact = target.exact * ([-1, 1, 1] if order == [0, 2, 1] else [1, 1, 1]) * draft.growth
-    all_places = fine.following(unbent[fine.nodes], settled, exact)
+    all_places = fine.following(unbent[fine.nodes], now, exact)
     if exact is unbent:
-        all_places[fine.nodes] = settled
-    smooth = all_places if exact is unbent else fine.following(unbent[fine.nodes], settled, unbent)
+        all_places[fine.nodes] = now
+    smooth = all_places if exact is unbent else fine.following(unbent[fine.nodes], now, unbent)
     normals = TriangleMesh(smooth, draft.whole.faces).vertex_normals()
     face, barycentric = onto.nearest_point(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
@@ -271,7 +273,10 @@ def finished(
     if source.domain.closed:
         carried, repaired = injective_on_sphere(carried, conformal, faces, lambda: tell(0.95))
     else:
-        carried, repaired = injective(carried, conformal, faces, target.boundary, target.holes, lambda: tell(0.95))
+        vertices = onto.mesh.vertices
+        carried, repaired = unfolded(
+            carried, conformal, faces, source, target, vertices, all_places, lambda: tell(0.95)
+        )
     return Bending(carried, offset, repaired)
 
 

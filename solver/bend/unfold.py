@@ -32,7 +32,7 @@ def injective(
     quarters, and over ever wider surroundings, until at last the Möbius map itself is left, which is injective.
     """
     ordered = carried.copy()
-    ordered[boundary] = _in_order(carried[boundary], conformal[boundary])
+    ordered[boundary] = in_order(carried[boundary], conformal[boundary])
     links = mean_value_weights(conformal, faces)
     result = _interpolated(ordered, conformal, faces, links, boundary, holes, tell)
     turned = _turned(result, faces)
@@ -110,7 +110,7 @@ def _along_boundary(places: Complexes, conformal: Complexes, free: Booleans) -> 
     return np.where(free, conformal * np.exp(filled[0] + 1j * filled[1]), places)
 
 
-def _in_order(carried: Complexes, conformal: Complexes) -> Complexes:
+def in_order(carried: Complexes, conformal: Complexes) -> Complexes:
     """Return boundary places, (k,), whose angles run on like those of the Möbius map, by 1/20 of its steps or more.
 
     Least squares under that condition (isotonic regression); the distances from the centre stay.

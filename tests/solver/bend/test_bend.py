@@ -4,7 +4,7 @@ from scans import bumps, mirrored, percent, posed, remeshed, shuffled
 
 from solver import Flattening, Mobius, TriangleMesh, flatten
 from solver.bend.bend import bent
-from solver.bend.unfold import _in_order, injective, mean_value_weights
+from solver.bend.unfold import in_order, injective, mean_value_weights
 from solver.flatten.distortion import signed_areas
 from solver.flatten.locate import TriangulatedDisc
 
@@ -202,11 +202,11 @@ def test_hard_maps_become_injective(source, kind, holes):
 def test_the_boundary_is_put_in_order():
     conformal = np.exp(2j * np.pi * np.arange(40) / 40)
     moved = conformal * np.exp(0.3j * np.sin(3 * np.angle(conformal)))
-    assert _in_order(moved, conformal) == pytest.approx(moved)
+    assert in_order(moved, conformal) == pytest.approx(moved)
     swapped = moved.copy()
     swapped[[5, 6]] = moved[[6, 5]]
-    found = _in_order(swapped, conformal)
+    found = in_order(swapped, conformal)
     steps = np.angle(np.roll(found, -1) / found)
     assert steps.min() > 0
     assert np.delete(found, [5, 6]) == pytest.approx(np.delete(moved, [5, 6]))
-    assert np.conj(_in_order(np.conj(swapped), np.conj(conformal))) == pytest.approx(found)
+    assert np.conj(in_order(np.conj(swapped), np.conj(conformal))) == pytest.approx(found)
