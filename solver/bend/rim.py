@@ -16,6 +16,9 @@ from ..surface.mesh import Complexes, Floats
 PER_SIDE = 4
 """Places that are tried on each side of the boundary."""
 
+MOST = 20_000_000
+"""Pairs of a vertex and a place up to which boundaries are put in order here: 80 MB, rims of some 2,000 vertices."""
+
 
 @dataclass(frozen=True, eq=False)
 class Rim:
@@ -47,7 +50,7 @@ class Rim:
         """Return boundary places, (k,), in the order of the Möbius map's: each its own or one on the rim.
 
         The sum of distances on the surface from where the vertices were bent to is the least there is (dynamic
-        programming along the boundary from the `surest` on).
+        programming along the boundary from the `surest` on). As they were where there are more than `MOST` pairs.
 
         Parameters
         ----------
@@ -59,6 +62,8 @@ class Rim:
         way = -1.0 if np.angle(np.roll(conformal, -1) / conformal).sum() < 0 else 1.0
         if (way * np.angle(np.roll(carried, -1) / carried) > 0).all():
             return carried
+        if len(carried) * (len(carried) + len(self.disc)) > MOST:
+            return carried
         first = surest(carried, conformal)
         cut = way * np.angle(carried[first])
         order = np.roll(np.arange(len(carried)), -first)
@@ -66,7 +71,7 @@ class Rim:
         angle = (way * np.angle(tried) - cut) % (2 * np.pi)
         rank = np.argsort(angle, kind="stable")
         own = np.argsort(rank, kind="stable")[: len(order)]
-        before, total = np.empty((len(order), len(tried)), np.intp), np.zeros(len(tried))
+        before, total = np.empty((len(order), len(tried)), np.int32), np.zeros(len(tried))
         for k, vertex in enumerate(order):
             apart = np.full(len(tried), np.inf)
             apart[len(order) :] = np.linalg.norm(self.position - bent[vertex], axis=1)
