@@ -16,10 +16,10 @@ from ..surface.topology import Topology, require_disc
 from .barycentre import conformal_barycentre
 from .circle import lost_rim, on_circle
 from .circle_packing import packed
-from .distortion import Distortion, distortion, signed_areas
+from .distortion import Distortion, distortion
 from .domain import DISC, Domain
 from .harmonic import riemann_map
-from .injective import require_injective, untangled
+from .injective import collapsed, require_injective, untangled
 from .locate import TriangulatedDisc
 from .mid_edge import mid_edge_map
 
@@ -148,7 +148,7 @@ def _centred(disc: Complexes, mesh: TriangleMesh) -> Complexes:
 
 def _turned(disc: Complexes, mesh: TriangleMesh) -> int:
     """Return how many triangles of the mesh are turned over or collapsed in the disc."""
-    return int((signed_areas(disc, mesh.faces) <= 0).sum())
+    return int(collapsed(disc, mesh.faces).sum())
 
 
 def _surface(mesh: TriangleMesh, holes: tuple[Integers, ...]) -> IntrinsicTriangulation:

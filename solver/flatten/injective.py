@@ -41,12 +41,12 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
     boundary : (k,) int
         Vertices on a strictly convex curve, which stay.
     """
-    turned = signed_areas(plane, faces) <= 0
+    turned = collapsed(plane, faces)
     if not turned.any():
         return plane
     if turned.sum() <= FEW:
         plane = relocated(plane, faces, boundary)
-        turned = signed_areas(plane, faces) <= 0
+        turned = collapsed(plane, faces)
         if not turned.any():
             return plane
     n = len(plane)
@@ -67,7 +67,7 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
         for _ in range(rings):
             near = near | (even @ near > 0)
         trial = _combined(weights, plane, np.flatnonzero(inside & near))
-        turned = signed_areas(trial, faces) <= 0
+        turned = collapsed(trial, faces)
         if not turned.any():
             return trial
         # places that are put right by now stay as they are, the others grow
@@ -77,7 +77,7 @@ def untangled(faces: Integers, lengths: Floats, plane: Complexes, boundary: Inte
         near = still
     for kind in (weights, even):
         trial = _combined(kind, plane, np.flatnonzero(inside))
-        if not (signed_areas(trial, faces) <= 0).any():
+        if not collapsed(trial, faces).any():
             return trial
     return plane
 
@@ -92,7 +92,7 @@ def relocated(plane: Complexes, faces: Integers, held: Integers) -> Complexes:
     plane, stays = plane.copy(), np.zeros(len(plane), bool)
     stays[held] = True
     for _ in range(SWEEPS):
-        corners = np.unique(faces[signed_areas(plane, faces) <= 0])
+        corners = np.unique(faces[collapsed(plane, faces)])
         moved = False
         for vertex in corners[~stays[corners]].tolist():
             star = faces[(faces == vertex).any(axis=1)]

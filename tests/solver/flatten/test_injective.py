@@ -6,7 +6,7 @@ from surfaces import planar, rings
 
 from solver import topology
 from solver.flatten.distortion import signed_areas
-from solver.flatten.injective import relocated, untangled
+from solver.flatten.injective import collapsed, relocated, untangled
 
 
 def test_a_map_without_folds_is_left_alone():
@@ -34,11 +34,32 @@ def test_everything_in_one_point_is_put_right():
     points = rings(10)
     mesh = planar(points)
     boundary = topology(mesh).boundary_loops[0]
-    collapsed = np.zeros_like(points)
-    collapsed[boundary] = points[boundary]
-    repaired = untangled(mesh.faces, mesh.edge_lengths, collapsed, boundary)
+    together = np.zeros_like(points)
+    together[boundary] = points[boundary]
+    repaired = untangled(mesh.faces, mesh.edge_lengths, together, boundary)
     assert (signed_areas(repaired, mesh.faces) > 0).all()
     assert (repaired[boundary] == points[boundary]).all()
+
+
+def test_what_only_rounding_keeps_apart_counts_as_collapsed():
+    """Two vertices within a last digit: floats say of triangles between them that they are not turned, wrongly."""
+    points = rings(10)
+    mesh = planar(points)
+    boundary = topology(mesh).boundary_loops[0]
+    inner = np.setdiff1d(mesh.edges[~np.isin(mesh.edges, boundary).any(axis=1)], boundary)
+    found = 0
+    for vertex in inner.tolist():
+        other = next(x for x in mesh.edges[(mesh.edges == vertex).any(axis=1)].ravel() if x in inner and x != vertex)
+        for last in (1, -1, 1j, -1j):
+            near = points.copy()
+            near[vertex] = points[other] + last * 1e-17
+            near = np.exp(0.3j) * near
+            wrong = collapsed(near, mesh.faces) & (signed_areas(near, mesh.faces) > 0)
+            if wrong.any() and not (signed_areas(near, mesh.faces) < 0).any():
+                found += 1
+                repaired = untangled(mesh.faces, mesh.edge_lengths, near, boundary)
+                assert not collapsed(repaired, mesh.faces).any()
+    assert found
 
 
 def test_slivers_far_apart_are_put_right_by_their_own_vertices_alone():
