@@ -64,13 +64,13 @@ SAME = RIM_REACH
 """Median distance, in roots of the source's area, up to which two drafts are of one map: what Möbius maps err by."""
 
 PROVED = 1.15
-"""Factor by which more of the target has to be surely right by another map of the same orientation for it to be taken."""
+"""Factor by which more of the target has to be surely right by another map of one orientation for it to be taken."""
 
 MIRRORED = 1.5
 """The same for a mirrored map beside one that is not.
 
-Of 8 pairs of noisy faces and one seen by a camera, nearly symmetric, mirrored wrong maps had up to 1.22 times as much as
-the right ones; on mirrored hands, feet, ears and teeth the right ones had 1.9 times as much, or more, as any that was
+Of 8 pairs of noisy faces and one seen by a camera, nearly symmetric, mirrored wrong maps had up to 1.22 times as much
+as the right ones; on mirrored hands, feet, ears and teeth the right ones had 1.9 times as much, or more, as any that was
 not mirrored: the middle of the two.
 """
 

@@ -36,9 +36,9 @@ true displacements of surfaces in pose, by their power in the first 60 modes of 
 eight pairs of faces (ICT), 0.35 on six (SIMPOP), 0.07 on three of feet, 0.03 on two of brains; between the faces'."""
 
 SOLVER_STEPS = 20
-"""Conjugate gradient steps per round, at most. Long waves along the surface come last: after 12, cheeks that a smile has
-moved are left behind by a tenth of the error; after 60 faces seen by a camera, which say nothing of what is hidden, err
-by a tenth more, and the others hardly less."""
+"""Conjugate gradient steps per round, at most. Long waves along the surface come last: after 12, cheeks that a smile
+has moved are left behind by a tenth of the error; after 60, faces seen by a camera, which tell nothing of what is
+hidden, err by a twentieth more, and the others hardly less."""
 
 DRAFT_STEPS = 12
 """The same for a draft, whose places are rough all the same."""

@@ -7,7 +7,7 @@ from scans import bumps, posed, remeshed
 from solver import AlignSettings, align
 from solver.align.dense import drafted_from
 from solver.align.hypotheses import Hypothesis, by_pose
-from solver.align.reconsider import PROVED, _decided, _screened, in_doubt
+from solver.align.reconsider import MIRRORED, _decided, _screened, in_doubt
 from solver.bend.bend import drafted
 from solver.stages import Stages
 
@@ -31,8 +31,8 @@ def said(found, sure: float, *, reflected: bool):
     ("plain", "mirrored", "taken", "open_"),
     [
         (0.9, 0.9, False, False),
-        (0.6, 0.6 * PROVED - 0.01, False, True),
-        (0.6, 0.6 * PROVED + 0.01, True, False),
+        (0.6, 0.6 * MIRRORED - 0.01, False, True),
+        (0.6, 0.6 * MIRRORED + 0.01, True, False),
         (0.6, 0.6, False, True),
         (0.6, 0.5, False, False),
         (0.8, 0.99, False, True),
