@@ -70,8 +70,8 @@ MIRRORED = 1.5
 """The same for a mirrored map beside one that is not.
 
 Of 8 pairs of noisy faces and one seen by a camera, nearly symmetric, mirrored wrong maps had up to 1.22 times as much
-as the right ones; on mirrored hands, feet, ears and teeth the right ones had 1.9 times as much, or more, as any that was
-not mirrored: the middle of the two.
+as the right ones; on mirrored hands, feet, ears and teeth the right ones had 1.9 times as much, or more, as any that
+was not mirrored: the middle of the two.
 """
 
 OPPOSITE = 4 / 7
