@@ -46,6 +46,8 @@ def unfolded(
     for way in _ways(carried, conformal, faces, source, target, vertices, bent):
         trial, _ = injective(way, conformal, faces, target.boundary, target.holes, tell)
         moved = np.flatnonzero(np.abs(trial - carried) > 0)
+        if not len(moved):  # the map itself is injective, and there is no other way
+            return trial, 0
         apart = _distance(trial[moved], bent[moved], source, vertices) - _distance(
             carried[moved], bent[moved], source, vertices
         )
