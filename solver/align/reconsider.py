@@ -18,7 +18,7 @@ from ..stages import Part
 from ..surface.mesh import Booleans, Floats
 from .alignment import Alignment
 from .dense import bent_densely, drafted_from
-from .hypotheses import Hypothesis, apart, by_pose, further, turned, unlike
+from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, turned, unlike
 from .remark import Remark
 
 DOUBTFUL = 0.5
@@ -185,6 +185,9 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         yield Hypothesis(other, None, "the mirrored one" if other.mobius.reflected else "the one that is not mirrored")
         if matched.mobius.reflected:
             yield from further(other, MAXIMA - 1, clock.part(0.0, 0.5))
+            opposite = by_own_mirror(matched, draft)
+            if opposite is not None:
+                yield opposite
     if found.mean_confidence < FITS:
         yield by_pose(matched, draft.onto)
     if found.mean_confidence <= DOUBTFUL:
