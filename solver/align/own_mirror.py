@@ -58,9 +58,9 @@ def mirror_plane(onto: SurfacePoints, descriptors: Floats) -> tuple[Floats, Floa
     used = np.flatnonzero(mesh.used)
     some = used[spread(mesh.vertices[used], ASKED)] if len(used) > ASKED else used
     points, normals = mesh.vertices[some], mesh.vertex_normals()[some]
-    _, found = KDTree(descriptors[some]).query(descriptors[some], k=np.arange(2, min(ALIKE + 1, len(some)) + 1))
-    like = np.asarray(found, np.intp)
-    here, there = np.repeat(np.arange(len(some)), like.size // len(some)), like.ravel()
+    _, found = KDTree(descriptors[some]).query(descriptors[some], k=min(ALIKE + 1, len(some)))
+    like = np.asarray(found, np.intp).reshape(len(some), -1)[:, 1:]
+    here, there = np.repeat(np.arange(len(some)), like.shape[1]), like.ravel()
     across = points[here] - points[there]
     length = np.linalg.norm(across, axis=1)
     aside = length > ASIDE
