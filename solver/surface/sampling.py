@@ -108,11 +108,11 @@ def thinned(points: Floats, spacing: float) -> Integers:
     crowded = max(0, int(np.log2(max(len(points), 1)) / 2) - 4)
     for halvings in range(crowded, -1, -1):
         pairs = KDTree(points[kept]).query_pairs(spacing / 2**halvings, output_type="ndarray")
-        kept = kept[_independent(pairs, rank[kept])]
+        kept = kept[independent(pairs, rank[kept])]
     return kept
 
 
-def _independent(pairs: Integers, rank: Integers) -> Booleans:
+def independent(pairs: Integers, rank: Integers) -> Booleans:
     """Return a maximal set, (n,), that holds one of each pair, (p, 2), at most: what comes first by rank, (n,), stays.
 
     Luby, "A Simple Parallel Algorithm for the Maximal Independent Set Problem" (1986).
