@@ -13,7 +13,9 @@ from mathutils import Matrix
 from ..solver import Alignment
 from ..solver.flatten.sphere import Flat
 from ..solver.surface.mesh import Floats, Integers
-from .demo.pictures import colored_mesh, flat_material, hues, put, render, rings, studio, upright, write
+from .studio.materials import flat_material
+from .studio.scene import put, render, studio, write
+from .studio.shapes import colored_mesh, hues, rings, upright
 
 RELIEF = 0.35
 """How much darker furrows are than ridges, so that one sees the surface on its disc or sphere."""

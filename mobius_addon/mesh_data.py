@@ -57,6 +57,11 @@ def foreach(collection: Any, name: str, width: int, dtype: type[np.generic]) -> 
     return values if width == 1 else values.reshape(-1, width)
 
 
+def read_vertices(mesh: bpy.types.Mesh) -> Floats:
+    """Return the vertex positions, (n, 3), in the mesh's own coordinates."""
+    return foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+
+
 def read_surface(obj: bpy.types.Object, name: str | None = None) -> Surface:
     """Return a mesh object as arrays.
 
@@ -98,7 +103,7 @@ def rest_positions(mesh: bpy.types.Mesh) -> Floats:
     """
     keys = mesh.shape_keys
     if keys is None or len(keys.reference_key.points) != len(mesh.vertices):
-        return foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
+        return read_vertices(mesh)
     return foreach(keys.reference_key.points, "co", 3, np.float32).astype(np.float64)
 
 
@@ -130,7 +135,7 @@ def _mixed_keys(mesh: bpy.types.Mesh) -> Floats | None:
 
 def in_world(obj: bpy.types.Object) -> Floats:
     """Return the places of a mesh object's vertices in the world, (n, 3)."""
-    own = foreach(obj.data.vertices, "co", 3, np.float32).astype(np.float64)
+    own = read_vertices(obj.data)
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     return own @ matrix[:3, :3].T + matrix[:3, 3]
 

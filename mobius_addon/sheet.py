@@ -15,8 +15,9 @@ from ..solver.carry.frames import nearest_orthogonal
 from ..solver.carry.interpolate import places
 from ..solver.surface.mesh import Floats
 from .attributes.expression_names import understood
-from .demo.pictures import CLAY, cover, fit, fresh_tree, light, put, render, studio, write
 from .mesh_data import Refusal, Surface, foreach, mirrored, rest_positions
+from .studio.materials import CLAY, cover, fresh_tree
+from .studio.scene import fit, light, put, render, studio, write
 
 _TELLING = ("eyeBlink", "jawOpen", "mouthSmile", "mouthPucker", "mouthClose", "browInnerUp")
 """Expressions that are shown first: what goes wrong is seen in them."""

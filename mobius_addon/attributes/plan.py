@@ -13,9 +13,10 @@ from ...solver.surface.mesh import Booleans
 from ..textures.made import Textures
 from ..textures.writing import made_or_removed, write_textures
 from .carrier import Values
+from .fitted_rig import write_rig
 from .key_set import KeyPlan
 from .record import remember, unedited
-from .rig import Rig, write_rig
+from .rig import Rig
 from .table import KINDS, Row
 from .unmatched import Unmatched
 from .vertex_groups import keep_order

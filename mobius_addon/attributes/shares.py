@@ -11,10 +11,10 @@ import numpy as np
 from ...solver import Correspondence
 from ...solver.surface.mesh import Floats
 from ..joined import Member
+from .fitted_rig import share_rig
 from .normals import NormalAccess
 from .placing import holds_nothing
 from .plan import Carried, Transfer, write_transfers
-from .rig import share_rig
 from .shape_keys import ShapeKeyAccess
 
 

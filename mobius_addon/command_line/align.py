@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Align two meshes, write what is asked for, and return the exit status."""
     from ...solver import report, save_map
-    from ..demo.pictures import require_cycles
     from ..files import Unreadable, outputs
     from ..map_picture import render_map
+    from ..studio.scene import require_cycles
 
     settings = align_settings(options)
     inputs = [options.source, options.target, options.landmarks, options.pairs]

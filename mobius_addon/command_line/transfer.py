@@ -82,12 +82,12 @@ def _transfer_to(options: argparse.Namespace) -> None:
     from ...solver import report, save_map
     from ..attributes.prepared import NothingThere
     from ..attributes.shares import write_shares
-    from ..demo.pictures import require_cycles
     from ..files import Unreadable, outputs, require_room, write_mesh
     from ..files.pictures_beside import write_map, write_pictures
     from ..last_transfer import describe_counts
     from ..operators.transfer import read_through
     from ..sheet import render_sheet
+    from ..studio.scene import require_cycles
 
     choices = transfer_settings(options)
     settings = align_settings(options)

@@ -23,9 +23,11 @@ from ..last_transfer import describe_counts
 from ..mesh_data import Refusal, Surface, read_surface
 from ..operators.align import summary, write_alignment
 from ..streams import DONE, quiet, say, say_error
+from ..studio.scene import require_cycles
+from ..studio.shapes import hues
 from .accuracy import best_rigid_error, transfer_error
 from .paint import FACE_PAINT, GRID_UV, paint_source
-from .pictures import Disc, Sitter, clay_material, hues, paint_material, render_discs, render_heads, require_cycles
+from .pictures import Disc, Sitter, clay_material, paint_material, render_discs, render_heads
 from .scans import POSE, GroundTruth, build_scans
 
 FILES = ("correspondence.png", "discs.png", "demo.blend", "REPORT.json")

@@ -6,8 +6,7 @@ import bpy
 import numpy as np
 
 from ...solver.surface.mesh import Floats
-from ..mesh_data import foreach
-from .scans import read_vertices
+from ..mesh_data import foreach, read_vertices
 
 FACE_PAINT = "Face paint"
 GRID_UV = "Grid"

@@ -18,7 +18,7 @@ from mathutils.bvhtree import BVHTree
 from scipy.spatial.transform import Rotation
 
 from ...solver.surface.mesh import Floats, Integers
-from ..mesh_data import foreach
+from ..mesh_data import foreach, read_vertices
 
 SUBDIVISIONS = 2
 VOXEL = 0.03
@@ -284,11 +284,6 @@ def to_mesh(shape: bmesh.types.BMesh, name: str) -> bpy.types.Mesh:
     shape.to_mesh(mesh)
     shape.free()
     return mesh
-
-
-def read_vertices(mesh: bpy.types.Mesh) -> Floats:
-    """Return the vertex positions, (n, 3), in the mesh's own coordinates."""
-    return foreach(mesh.vertices, "co", 3, np.float32).astype(np.float64)
 
 
 def write_vertices(mesh: bpy.types.Mesh, positions: Floats) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 from ..bend.bend import Bending
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
-from ..search.branch_and_bound import SearchResult
 from ..search.matching import Objective
+from ..search.outcome import SearchResult
 from ..search.rival import Rival
 from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..stages import SearchProgress
-from .branch_and_bound import Search
+from .frontier import Search
 from .matching import Objective, matching
 from .outcome import SearchResult
 from .watch import watched

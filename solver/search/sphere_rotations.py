@@ -9,7 +9,7 @@ import numpy as np
 
 from ..mobius import SphereMobius
 from ..surface.mesh import Floats
-from .branch_and_bound import CENTRES, NEAR, SMALLEST_CELL, Search
+from .frontier import CENTRES, NEAR, SMALLEST_CELL, Search
 from .kernels import MOST_POINTS
 from .kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
 from .kernels.sphere_kernels import sphere_kernels_for

@@ -21,7 +21,8 @@ from ..mobius import SphereMobius
 from ..stages import SearchProgress
 from ..surface.mesh import Booleans, Floats
 from .box_bounds import place_of, transformation
-from .branch_and_bound import FRONTIER, SMALLEST_CELL, Search, require_ends
+from .branch_and_bound import require_ends
+from .frontier import FRONTIER, SMALLEST_CELL, Search
 from .kernels.box_kernels import box_kernels_for
 from .kernels.boxes import BOUND, COLUMNS, LARGEST, MIDDLE, SIDES, coefficients, points, whole_group
 from .outcome import SphereSearchResult

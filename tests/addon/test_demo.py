@@ -19,6 +19,7 @@ from mobius_extension.mobius_addon.command_line import main  # noqa: E402
 from mobius_extension.mobius_addon.demo import accuracy, paint, pictures, scans  # noqa: E402
 from mobius_extension.mobius_addon.demo.paint import FACE_PAINT, GRID_UV, SMILE, face_paint, front_view  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import Refusal, foreach, read_surface  # noqa: E402
+from mobius_extension.mobius_addon.studio import scene as studio  # noqa: E402
 
 FILES = ["REPORT.json", "correspondence.png", "demo.blend", "discs.png"]
 
@@ -35,7 +36,7 @@ def built(empty_scene: Any) -> Built:
 def finished(tmp_path_factory: pytest.TempPathFactory, registered: None) -> Iterator[Path]:
     """The folder that a whole run leaves, with smaller pictures than usual."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pictures, "PIXELS_ACROSS", 280)
+        patch.setattr(studio, "PIXELS_ACROSS", 280)
         folder = tmp_path_factory.mktemp("demo") / "new" / "folder"
         assert main(["demo", "-o", str(folder)]) == 0
         yield folder
@@ -181,10 +182,10 @@ def test_the_blend_holds_the_two_scans_and_what_was_carried(finished: Path, buil
 
 
 def test_pictures_leave_no_data_behind(built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pictures, "PIXELS_ACROSS", 64)
-    scene, kept = bpy.context.scene, [sorted(x.name for x in blocks) for blocks in pictures.made_here()]
+    monkeypatch.setattr(studio, "PIXELS_ACROSS", 64)
+    scene, kept = bpy.context.scene, [sorted(x.name for x in blocks) for blocks in studio.made_here()]
     render_one(built[0], tmp_path / "head.png")
-    assert [sorted(x.name for x in blocks) for blocks in pictures.made_here()] == kept
+    assert [sorted(x.name for x in blocks) for blocks in studio.made_here()] == kept
     assert list(bpy.data.scenes) == [scene]
     assert bpy.context.scene == scene
 
@@ -214,7 +215,7 @@ def test_a_failure_on_the_way_leaves_nothing(
         raise Refusal("the pictures failed")
 
     monkeypatch.setattr(demo, "SETTINGS", replace(demo.SETTINGS, samples=12, targets=80, refine="none"))
-    monkeypatch.setattr(pictures, "PIXELS_ACROSS", 64)
+    monkeypatch.setattr(studio, "PIXELS_ACROSS", 64)
     monkeypatch.setattr(demo, "render_discs", refuse)
     old = tmp_path / "old"
     old.mkdir()

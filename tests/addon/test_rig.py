@@ -179,7 +179,7 @@ def test_without_asking_no_rig_comes(source):
 
 
 def test_a_failure_leaves_no_rig_behind(source, monkeypatch):
-    from mobius_extension.mobius_addon.attributes import rig
+    from mobius_extension.mobius_addon.attributes import fitted_rig
 
     target, carrier = likeness(source, 22, Matrix())
     plan = plan_transfer(source, target, carrier, TransferSettings(rig=True))
@@ -187,7 +187,7 @@ def test_a_failure_leaves_no_rig_behind(source, monkeypatch):
     def fail(*_: Any) -> None:
         raise RuntimeError("no")
 
-    monkeypatch.setattr(rig, "_look_at_itself", fail)
+    monkeypatch.setattr(fitted_rig, "_look_at_itself", fail)
     with pytest.raises(RuntimeError, match="no"):
         plan.write(target)
     assert [x.name for x in bpy.data.armatures] == ["Rig"]

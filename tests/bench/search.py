@@ -27,10 +27,11 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).resolve().parent)]
 from algorithm_1 import algorithm_1  # noqa: E402
 
 from solver import Mobius, search  # noqa: E402
-from solver.search.branch_and_bound import SMALLEST_CELL, SearchResult  # noqa: E402
+from solver.search.frontier import SMALLEST_CELL  # noqa: E402
 from solver.search.kernels import CompiledKernels, compiled  # noqa: E402
 from solver.search.kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y, new_nodes  # noqa: E402
 from solver.search.matching import Matching, matching  # noqa: E402
+from solver.search.outcome import SearchResult  # noqa: E402
 
 
 def evenly(rng: np.random.Generator, count: int, largest: float = 0.95) -> np.ndarray:

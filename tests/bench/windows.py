@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).resolve().parent)]
 
 from search import dense_instance, paper_instance  # noqa: E402
 
-from solver.search.branch_and_bound import SMALLEST_CELL  # noqa: E402
+from solver.search.frontier import SMALLEST_CELL  # noqa: E402
 from solver.search.kernels import CompiledKernels  # noqa: E402
 from solver.search.kernels.build_wheel import wheel  # noqa: E402
 from solver.search.kernels.compiled import ARENA, _Problem  # noqa: E402

@@ -14,8 +14,8 @@ from instances import disc_points, nasty_points
 
 from solver import Mobius, search
 from solver.search.bounds import exact_arcs
-from solver.search.branch_and_bound import SMALLEST_CELL
 from solver.search.certificate import certify
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels import CompiledKernels, ReferenceKernels, compiled
 from solver.search.kernels.nodes import BOUND, FROM, HALF, KAPPA_X, KAPPA_Y, WIDTH, X, Y, new_nodes
 from solver.search.kernels.reference import best_rotations, bound_cells
@@ -120,7 +120,7 @@ def libraries() -> dict[str, object]:
 @contextmanager
 def kernels_of(library: object | None) -> Iterator[None]:
     """Have searches use one compiled library, or numpy."""
-    module, before = sys.modules["solver.search.branch_and_bound"], compiled.library
+    module, before = sys.modules["solver.search.frontier"], compiled.library
     kept = module.kernels_for
     compiled.library = lambda: library
     module.kernels_for = CompiledKernels if library else ReferenceKernels

@@ -10,7 +10,7 @@ from sphere_attacks import cornered_problem, kernels_of
 
 from solver.mobius import SphereMobius
 from solver.search.box_bounds import bounds_of, place_of
-from solver.search.branch_and_bound import SMALLEST_CELL
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels.box_kernels import CompiledBoxKernels, most_of
 from solver.search.kernels.boxes import BOUND, FACE, LARGEST, MIDDLE, SIDES
 from solver.search.sphere_matching import SphereMatching

@@ -13,7 +13,7 @@ from attacks import libraries, violations
 from spheres import random_mobius, sphere_points, unit
 
 from solver.mobius import SphereMobius
-from solver.search.branch_and_bound import SMALLEST_CELL
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels.nodes import BOUND, FROM, HALF, WIDTH, X, Y
 from solver.search.kernels.sphere_kernels import CompiledSphereKernels, bound_sphere_cells
 from solver.search.kernels.sphere_nodes import FACE, new_sphere_nodes

@@ -15,8 +15,8 @@ from scipy.optimize import minimize
 from ...mobius import Mobius
 from ...stages import SearchProgress
 from ...surface.mesh import Complexes, Floats
-from ..branch_and_bound import SearchResult
 from ..fit import images, parameters, residuals, transformation
+from ..outcome import SearchResult
 from .incumbent import Incumbent, incumbent
 
 

@@ -15,9 +15,9 @@ from scipy.sparse import csr_array, vstack
 
 from ...stages import SearchProgress
 from ...surface.mesh import Complexes, Floats, Integers
-from ..branch_and_bound import SearchResult
 from ..fit import algebraic_fit, fitted
 from ..measures import distances
+from ..outcome import SearchResult
 from .incumbent import Incumbent, incumbent
 
 LARGEST_RADIUS = 0.5

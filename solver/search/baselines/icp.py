@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from ...mobius import Mobius
 from ...stages import SearchProgress
-from ..branch_and_bound import SearchResult
 from ..fit import fitted
 from ..measures import distances
+from ..outcome import SearchResult
 from .incumbent import incumbent
 
 

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from ...mobius import Mobius
 from ...stages import SearchProgress
 from ...surface.mesh import Complexes, Floats, Integers
-from ..branch_and_bound import SearchResult
 from ..fit import residuals
+from ..outcome import SearchResult
 from .incumbent import Incumbent, incumbent
 
 DISTANCES_AT_ONCE = 1 << 18

@@ -11,7 +11,7 @@ from PIL import Image
 
 from solver import Flattening, Mobius, TriangleMesh
 from solver.mobius import hyperbolic_distance
-from solver.search.branch_and_bound import SearchResult
+from solver.search.outcome import SearchResult
 
 from . import quoted
 from .methods import Problem

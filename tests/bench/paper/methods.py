@@ -9,10 +9,10 @@ import numpy as np
 
 from solver import Mobius, search
 from solver.search.baselines import brute_force, gradient_descent, graph_matching, icp, voting
-from solver.search.branch_and_bound import SearchResult
 from solver.search.kernels import kernels_for
 from solver.search.matching import matching
 from solver.search.measures import q_mv, q_truth
+from solver.search.outcome import SearchResult
 
 TIME_LIMIT = 300.0
 """Seconds, by the clock, after which the search gives the gap instead of the certificate."""

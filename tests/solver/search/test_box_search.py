@@ -12,7 +12,7 @@ from spheres import random_mobius, sphere_points, unit
 
 from solver.mobius import SphereMobius, spinors
 from solver.search.box_bounds import bounds_of, place_of, polar, transformation
-from solver.search.branch_and_bound import SMALLEST_CELL
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels.box_kernels import CompiledBoxKernels, halved, most_of
 from solver.search.kernels.boxes import FACE, FREE, MIDDLE, SIDES, new_boxes, points, whole_group
 from solver.search.sphere_matching import sphere_matching

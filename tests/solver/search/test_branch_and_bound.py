@@ -165,7 +165,7 @@ def test_a_full_frontier_is_searched_depth_first(monkeypatch):
     rng = np.random.default_rng(10)
     source, target = planted(rng, random_mobius(rng, 0.5), 40, 0.6, 0.01)
     free = search(source, target, 0.03, z_max=0.8)
-    monkeypatch.setattr(sys.modules["solver.search.branch_and_bound"], "FRONTIER", 20)
+    monkeypatch.setattr(sys.modules["solver.search.frontier"], "FRONTIER", 20)
     held = search(source, target, 0.03, z_max=0.8)
     assert held.certified
     assert held.value == free.value
@@ -177,7 +177,7 @@ def test_what_cells_too_small_to_split_leave_open_is_reported_as_a_gap(monkeypat
     source, target = planted(rng, random_mobius(rng, 0.5), 40, 0.4, 0.01)
     optimum = search(source, target, 0.02, z_max=0.8)
     assert optimum.certified
-    monkeypatch.setattr(sys.modules["solver.search.branch_and_bound"], "SMALLEST_CELL", smallest)
+    monkeypatch.setattr(sys.modules["solver.search.frontier"], "SMALLEST_CELL", smallest)
     coarse = search(source, target, 0.02, z_max=0.8)
     assert coarse.value <= optimum.value <= coarse.upper_bound
     assert not coarse.certified

@@ -13,7 +13,7 @@ from test_bounds import points_of_cells, random_cells
 
 from solver import Mobius, search
 from solver.search.bounds import enclosing_arcs, images
-from solver.search.branch_and_bound import SMALLEST_CELL
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels import CompiledKernels, ReferenceKernels, compiled, kernels_for
 from solver.search.kernels.nodes import BOUND, FROM, HALF, KAPPA_X, KAPPA_Y, WIDTH, X, Y, new_nodes, whole_disc
 from solver.search.kernels.reference import best_rotations
@@ -196,7 +196,7 @@ def test_search_finds_the_same_value_with_either(monkeypatch, weighted):
         options = {"weights": weights, "z_max": 0.7, "reflect": seed % 2 == 0}
         fast = search(source, target, 0.06, **options)
         with monkeypatch.context() as patch:
-            patch.setattr(sys.modules["solver.search.branch_and_bound"], "kernels_for", ReferenceKernels)
+            patch.setattr(sys.modules["solver.search.frontier"], "kernels_for", ReferenceKernels)
             slow = search(source, target, 0.06, **options)
         assert (fast.kernels, slow.kernels) == ("compiled", "numpy")
         assert fast.certified

@@ -11,7 +11,7 @@ from sphere_attacks import attack, cells_of, kernels_of, searched, seen_through_
 from spheres import even_points, random_mobius, sphere_points, unit
 
 from solver.mobius import SphereMobius
-from solver.search.branch_and_bound import SMALLEST_CELL
+from solver.search.frontier import SMALLEST_CELL
 from solver.search.kernels.nodes import HALF
 from solver.search.kernels.sphere_kernels import CompiledSphereKernels, bound_sphere_cells
 from solver.search.kernels.sphere_nodes import FACE, new_sphere_nodes, whole_sphere

@@ -70,7 +70,7 @@ def test_cancelling_takes_no_time(kind):
 
 
 def test_the_fallback_in_numpy_is_on_time(monkeypatch):
-    monkeypatch.setattr(sys.modules["solver.search.branch_and_bound"], "kernels_for", ReferenceKernels)
+    monkeypatch.setattr(sys.modules["solver.search.frontier"], "kernels_for", ReferenceKernels)
     given, options = problem("wide")
     begun = time.perf_counter()
     found = search(*given, time_limit=0.3, **options)
@@ -165,7 +165,7 @@ def test_rivals_do_not_depend_on_machine_or_threads(monkeypatch):
     rng = np.random.default_rng(5)
     source, target = planted(rng, Mobius(0.2, 1.0), 50, 0.5, 0.01)
     objective = Objective(source, target, np.full(50, 0.1), rng.random((50, 50)))
-    module = sys.modules["solver.search.branch_and_bound"]
+    module = sys.modules["solver.search.frontier"]
     kernels_for, found = module.kernels_for, []
     monkeypatch.setattr(sys.modules["solver.search.rival"], "LOOKED_AT", 0)  # decided long before it is over
     for threads, pause in ((1, 0), (2, 0), (2, 0.03)):
@@ -177,7 +177,7 @@ def test_rivals_do_not_depend_on_machine_or_threads(monkeypatch):
             return kernels
 
         monkeypatch.setattr(module, "kernels_for", slow)
-        monkeypatch.setattr(module.os, "cpu_count", lambda threads=threads: threads)
+        monkeypatch.setattr("os.cpu_count", lambda threads=threads: threads)
         rival = best_rival(
             objective, [Mobius(0.2, 1.0)], z_max=0.8, enough=25.0, time_limit=None, progress=lambda _: None
         )
