@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from .kept import kept
 
 Floats = npt.NDArray[np.float64]
 
@@ -78,7 +79,7 @@ class TriangleMesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", np.ascontiguousarray(faces, dtype=np.intp))
 
-    @cached_property
+    @kept
     def fingerprint(self) -> str:
         """32 hexadecimal digits of the positions and faces, in their order; the same on every platform.
 
@@ -93,37 +94,37 @@ class TriangleMesh:
         digest.update(self.faces.astype("<i8", copy=False).tobytes())
         return digest.hexdigest()
 
-    @cached_property
+    @kept
     def face_vectors(self) -> Floats:
         """Cross product of two sides per face, (m, 3): the face normal times twice the area."""
         a = self.vertices[self.faces[:, 0]]
         (ux, uy, uz), (vx, vy, vz) = ((self.vertices[self.faces[:, k]] - a).T for k in (1, 2))
         return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
 
-    @cached_property
+    @kept
     def face_areas(self) -> Floats:
         """Area of each face, (m,), in squared length units."""
         return 0.5 * np.sqrt((self.face_vectors**2).sum(axis=1))
 
-    @cached_property
+    @kept
     def area(self) -> float:
         """Area of the surface, in squared length units."""
         return float(self.face_areas.sum())
 
-    @cached_property
+    @kept
     def vertex_areas(self) -> Floats:
         """Barycentric dual area of each vertex, (n,): a third of the faces around it."""
         third = np.repeat(self.face_areas / 3, 3)
         return np.bincount(self.faces.ravel(), third, len(self.vertices)).astype(np.float64, copy=False)
 
-    @cached_property
+    @kept
     def used(self) -> Booleans:
         """Whether each vertex is in a face, (n,)."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces] = True
         return used
 
-    @cached_property
+    @kept
     def edge_lengths(self) -> Floats:
         """Length of the side opposite each corner, (m, 3), in length units."""
         low, high = self.edges.T
@@ -141,11 +142,11 @@ class TriangleMesh:
         """Row in `edges` of each side, (3 m,); side 3 f + k is opposite corner k of face f."""
         return self._edges_of_sides[1]
 
-    @cached_property
+    @kept
     def _edges_of_sides(self) -> tuple[Integers, Integers]:
         return edges_of_sides(self.faces, len(self.vertices))
 
-    @cached_property
+    @kept
     def twins(self) -> Integers:
         """The other side of each side's edge, (3 m,); -1 where the edge has one side, or more than two."""
         return twin_sides(self.edge_of_side)

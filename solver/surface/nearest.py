@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from .kept import kept
 from .mesh import Booleans, Floats, Integers, TriangleMesh, face_neighbours
 
 SUITABLE = 2
@@ -35,16 +35,16 @@ class SurfacePoints:
     loops: tuple[Integers, ...]
     normal_weight: float
 
-    @cached_property
+    @kept
     def _normals(self) -> Floats:
         return self.mesh.vertex_normals()
 
-    @cached_property
+    @kept
     def _features(self) -> Floats:
         """Position and weighted normal of each vertex, (n, 6)."""
         return np.hstack([self.mesh.vertices, self.normal_weight * self._normals])
 
-    @cached_property
+    @kept
     def _tree(self) -> tuple[KDTree, Integers]:
         """The vertices in use and the faces' centres, with positions and weighted unit normals; a face of each."""
         features = self._features
@@ -56,18 +56,18 @@ class SurfacePoints:
             [first // 3, np.arange(len(self.mesh.faces))]
         )
 
-    @cached_property
+    @kept
     def _neighbours(self) -> Integers:
         return face_neighbours(self.mesh.faces, len(self.mesh.vertices))
 
-    @cached_property
+    @kept
     def _on_rim(self) -> Booleans:
         rim = np.zeros(len(self.mesh.vertices), bool)
         for loop in self.loops:
             rim[loop] = True
         return rim
 
-    @cached_property
+    @kept
     def _rim(self) -> tuple[KDTree, Floats, Floats]:
         """Points along the boundaries' edges, four to each, and the unit vectors along them."""
         start = self.mesh.vertices[np.concatenate(self.loops)]
