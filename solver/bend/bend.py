@@ -153,7 +153,7 @@ def drafted(
     about = source.boundary if len(source.boundary) else source.mesh.used
     middle = source.mesh.vertices[about].mean(axis=0)
     onto = SurfacePoints(
-        TriangleMesh((source.mesh.vertices - middle) / np.sqrt(source.mesh.area), source.mesh.faces),
+        source.mesh.moved((source.mesh.vertices - middle) / np.sqrt(source.mesh.area)),
         source.loops,
         NORMAL_WEIGHT,
     )
@@ -183,8 +183,9 @@ def drafted(
 
 def facing(mesh: TriangleMesh, reflected: bool) -> tuple[TriangleMesh, list[int]]:
     """Return the mesh, mirrored back with its faces turned if it is reflected, so that normals agree; their order."""
-    mirror, order = ([-1, 1, 1], [0, 2, 1]) if reflected else ([1, 1, 1], [0, 1, 2])
-    return TriangleMesh(mesh.vertices * mirror, mesh.faces[:, order]), order
+    if not reflected:
+        return mesh, [0, 1, 2]
+    return TriangleMesh(mesh.vertices * [-1, 1, 1], mesh.faces[:, [0, 2, 1]]), [0, 2, 1]
 
 
 def _best_start(

@@ -54,7 +54,7 @@ def diffused_curvatures(
     sides = mollified_lengths(mesh.edge_lengths)
     surface = intrinsic_delaunay(IntrinsicTriangulation(mesh.faces, sides, mesh.twins, len(mesh.vertices)))
     stiffness, masses = non_negative_laplacian(surface), surface.vertex_areas
-    used = np.unique(mesh.faces)
+    used = np.flatnonzero(mesh.used)
     inner = csc_array(stiffness[used][:, used])
     weights = csc_array(diags_array(masses[used]))
     missing, inside = _missing_angles(mesh)

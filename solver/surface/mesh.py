@@ -79,6 +79,18 @@ class TriangleMesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", np.ascontiguousarray(faces, dtype=np.intp))
 
+    def moved(self, vertices: Floats) -> TriangleMesh:
+        """Return the mesh with its vertices, (n, 3), elsewhere; what is known of its edges stays known."""
+        result = TriangleMesh(vertices, self.faces, self.name)
+        known = ("_edges_of_sides", "twins", "used")
+        result.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
+        return result
+
+    @property
+    def neighbours(self) -> Integers:
+        """The face across the side opposite each corner, (m, 3); -1 where there is none, or several."""
+        return np.where(self.twins < 0, -1, self.twins // 3).reshape(-1, 3)
+
     @kept
     def fingerprint(self) -> str:
         """32 hexadecimal digits of the positions and faces, in their order; the same on every platform.
@@ -180,8 +192,15 @@ def directed_edges(faces: Integers) -> Integers:
 
 def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
     """Return undirected edges, (e, 2), each once, sorted, and the edge of each side in `directed_edges`, (3 m,)."""
-    edges, edge_of_side = np.unique(_edge_keys(faces, vertex_count), return_inverse=True)
-    return np.stack(np.divmod(edges, vertex_count), axis=1), edge_of_side.reshape(-1)
+    keys = _edge_keys(faces, vertex_count)
+    # as np.unique does, but for the stable order, which takes half the time on numbers that lie nearly in order
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    first = np.ones(len(keys), bool)
+    first[1:] = keys[1:] != keys[:-1]
+    edge_of_side = np.empty(len(keys), np.intp)
+    edge_of_side[order] = np.cumsum(first) - 1
+    return np.stack(np.divmod(keys[first], vertex_count), axis=1), edge_of_side
 
 
 def _edge_keys(faces: Integers, vertex_count: int) -> Integers:

@@ -92,9 +92,9 @@ def farthest_points(
 
 
 class _Surroundings:
-    """Finds how far along edges vertices are from a new point, those alone that may be nearer to it than to all before.
+    """Finds how far along edges vertices are from a new point: those that may be nearer to it than to all before.
 
-    A way to such a vertex leads through such vertices alone: were one on it nearer to a point before, the last would be.
+    A way to such a vertex leads through such alone: were one on it nearer to a point before, the last would be too.
     """
 
     def __init__(self, vertices: Floats, graph: csr_array) -> None:
@@ -103,7 +103,7 @@ class _Surroundings:
         self.place = np.full(len(vertices), -1)
 
     def distances(self, new: int, distance: Floats) -> tuple[Integers, Floats]:
-        """Return vertices, (k,), and how far they are from vertex `new`, (k,), where all lie `distance`, (n,), so far."""
+        """Return vertices, (k,), and how far they are from vertex `new`, (k,); `distance`, (n,): of all, so far."""
         some = np.array(self.tree.query_ball_point(self.vertices[new], distance[new], return_sorted=False), np.intp)
         apart = np.sqrt(((self.vertices[some] - self.vertices[new]) ** 2).sum(axis=1))
         some = some[(1 - 1e-9) * apart < distance[some]]  # no way along edges is shorter
