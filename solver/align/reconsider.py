@@ -113,7 +113,7 @@ def reconsidered(
     drafts = []
     for number, each in enumerate(likely):
         part = clock.part(0.4 + 0.1 * number / len(likely), 0.4 + 0.1 * (number + 1) / len(likely))
-        draft = drafted_from(each.alignment, part.part(0.0, 1.0, "reconsider"), each.start)
+        draft = drafted_from(each.alignment, part.part(0.0, 1.0, "reconsider"), each.start, like=first[0])
         differs = unlike(each.alignment, draft[0], draft[2])
         if differs <= UNLIKE:
             drafts.append((differs * apart(draft[0]), each, draft))
@@ -140,10 +140,11 @@ def _screened(
     clock: Part,
 ) -> list[Hypothesis]:
     """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more."""
-    drafts = []
+    drafts, like = [], first[0]
     for number, each in enumerate(hypotheses):
         part = clock.part(number / (len(hypotheses) + 1), (number + 1) / (len(hypotheses) + 1))
-        draft, _, there = drafted_from(each.alignment, part, each.start, SCREENED)
+        draft, _, there = drafted_from(each.alignment, part, each.start, SCREENED, like)
+        like = draft
         differs = unlike(each.alignment, draft, there)
         if differs <= ROUGHLY * UNLIKE:
             drafts.append((differs * apart(draft), each, draft))
@@ -157,7 +158,7 @@ def _screened(
             others.append((score, each))
     if all(_fitting(np.inf, 0.0, found, each) for _, each in others):
         return [each for _, each in others]
-    draft, _, there = drafted_from(matched, clock.part(0.9, 1.0), None, SCREENED)
+    draft, _, there = drafted_from(matched, clock.part(0.9, 1.0), None, SCREENED, like)
     least = ROUGHLY * min(unlike(matched, draft, there) * apart(draft), others[0][0])
     return [each for score, each in others if _fitting(score, least, found, each)]
 

@@ -46,13 +46,14 @@ class SurfacePoints:
     normal_weight: float
 
     @kept
-    def _normals(self) -> Floats:
+    def normals(self) -> Floats:
+        """Unit normal of each vertex, (n, 3)."""
         return self.mesh.vertex_normals()
 
     @kept
     def _features(self) -> Floats:
         """Position and weighted normal of each vertex, (n, 6)."""
-        return np.hstack([self.mesh.vertices, self.normal_weight * self._normals])
+        return np.hstack([self.mesh.vertices, self.normal_weight * self.normals])
 
     @kept
     def _tree(self) -> tuple[KDTree, Integers]:
@@ -139,7 +140,7 @@ class SurfacePoints:
         corners = self.mesh.faces[face]
         beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
         position, normal = (
-            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self._normals)
+            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self.normals)
         )
         return position, _unit(normal), beyond
 
