@@ -1,12 +1,14 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scans import bumps, posed
 
 from solver import AlignSettings, TriangleMesh, align
+from solver.align import reconsider
 from solver.align import side_by_side as module
 from solver.align.side_by_side import side_by_side
 from solver.stages import Cancelled, Progress
@@ -80,16 +82,22 @@ def test_what_a_work_raises_is_raised_that_of_the_first_before():
             side_by_side([wrong("one"), wrong("two")], lambda _: None, threads=threads)
 
 
+SMALL = AlignSettings(samples=40, targets=200)
+
+
 def pair() -> tuple[TriangleMesh, TriangleMesh]:
-    mesh = bumps(700, seed=6)
+    mesh = bumps(300, seed=6)
     return mesh, posed(mesh, seed=1)
 
 
 def test_two_threads_find_the_same_to_the_last_bit(monkeypatch: pytest.MonkeyPatch):
-    plain = align(*pair(), AlignSettings(threads=1))
+    """Also where other maps are tried, as if the first were in doubt."""
+    monkeypatch.setattr(reconsider, "FITS", 2.0)
+    plain = align(*pair(), replace(SMALL, threads=1))
     monkeypatch.setattr(module, "LARGE", 1)
     told: list[Progress] = []
-    found = align(*pair(), AlignSettings(threads=2), lambda state: told.append(state))
+    found = align(*pair(), replace(SMALL, threads=2), lambda state: told.append(state))
+    assert "reconsider" in found.seconds
     assert np.array_equal(found.carried, plain.carried, equal_nan=True)
     assert found.mobius == plain.mobius
     assert (found.confidence == plain.confidence).all()
@@ -101,8 +109,9 @@ def test_two_threads_find_the_same_to_the_last_bit(monkeypatch: pytest.MonkeyPat
 def test_any_word_of_progress_may_cancel_it(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "LARGE", 1)
     monkeypatch.setattr(module, "EVERY", 1e-4)
+    monkeypatch.setattr(reconsider, "FITS", 2.0)
     before = threading.active_count()
-    for last in (3, 8, 20):
+    for last in (3, 8, 20, 700):
         told: list[float] = []
 
         def until(state: Progress, told: list[float] = told, last: int = last) -> bool:
@@ -110,7 +119,7 @@ def test_any_word_of_progress_may_cancel_it(monkeypatch: pytest.MonkeyPatch):
             return len(told) < last
 
         with pytest.raises(Cancelled):
-            align(*pair(), progress=until)
+            align(*pair(), SMALL, until)
         assert len(told) == last
         assert threading.active_count() == before
 
