@@ -12,8 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..flatten.distortion import signed_areas
-from ..flatten.flatten import Flattening
 from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
@@ -105,10 +103,8 @@ def _goes_to_sphere(surface: Surface) -> bool:
 def shrunk(flattening: Flat) -> float:
     """Return the share of a surface's area that is smaller in its disc or sphere than `SHRUNK` times evenly."""
     mesh = flattening.mesh
-    if isinstance(flattening, Flattening):
-        there, whole = signed_areas(flattening.disc, mesh.faces), np.pi
-    else:
-        there, whole = TriangleMesh(np.nan_to_num(flattening.places), mesh.faces).face_areas, 4 * np.pi
+    whole = 4 * np.pi if flattening.domain.closed else np.pi
+    there = flattening.domain.flat_areas(flattening.places, mesh.faces)
     scale = there / np.maximum(mesh.face_areas, np.finfo(float).tiny)
     return float(mesh.face_areas[scale < SHRUNK * whole / mesh.area].sum() / mesh.area)
 

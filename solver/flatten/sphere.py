@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
 from ..surface.kept import kept
 from ..surface.laplacian import cotangents, mollified_lengths
-from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
+from ..surface.mesh import Complexes, Floats, Integers, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.sampling import edge_graph
 from ..surface.statistics import weighted_median
 from ..surface.topology import require_sphere
@@ -97,13 +97,6 @@ class SphereFlattening:
 
 
 Flat = Flattening | SphereFlattening
-
-
-def require_open(flat: Flat) -> Flattening:
-    """Return a flattening that is a disc; raises `MeshError` of a sphere, where only discs go on."""
-    if isinstance(flat, Flattening):
-        return flat
-    raise MeshError(f"'{flat.mesh.name}' is closed, and collections take open surfaces only: cut all open alike")
 
 
 def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:
