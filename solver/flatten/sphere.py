@@ -11,12 +11,12 @@ way, by the plane too.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
+from ..surface.kept import kept
 from ..surface.laplacian import cotangents, mollified_lengths
 from ..surface.mesh import Complexes, Floats, Integers, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.sampling import edge_graph
@@ -65,7 +65,7 @@ class SphereFlattening:
         """Where the places are."""
         return SPHERE
 
-    @cached_property
+    @kept
     def triangles(self) -> TriangulatedDisc:
         """The triangles in the sphere, prepared for point location."""
         return self.domain.triangulated(self.places, self.mesh.faces)
@@ -90,7 +90,7 @@ class SphereFlattening:
         """None."""
         return 0.0
 
-    @cached_property
+    @kept
     def distortion(self) -> Distortion:
         """How far the map is from conformal."""
         return spherical_distortion(self.mesh, self.sphere)
