@@ -87,11 +87,13 @@ def flattened(source: Surface, target: Surface, settings: AlignSettings, tell: C
         side_by_side([partial(_flat, surface) for surface in (source, target)], tell)
 
 
-def _in_order(surface: Surface, _: Callable[[float], None]) -> None:
+def _in_order(surface: Surface, note: Callable[[float], None]) -> None:
     with suppress(MeshError):
         _ = surface.cleaned
+    note(1.0)
 
 
-def _flat(surface: Surface, _: Callable[[float], None]) -> None:
+def _flat(surface: Surface, note: Callable[[float], None]) -> None:
     with suppress(MeshError):
         _ = surface.flattening
+    note(1.0)
