@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -178,6 +180,24 @@ class SphereMobius:
             x = x * [1.0, -1.0, 1.0]
         h = np.array(self.h)
         return (1 - h @ h) / ((x - h) ** 2).sum(axis=-1)
+
+
+def as_plain(mobius: Mobius | SphereMobius) -> dict[str, Any]:
+    """Return a transformation as JSON-ready data."""
+    if isinstance(mobius, SphereMobius):
+        return {"h": list(mobius.h), "rotation": list(mobius.rotation), "reflected": mobius.reflected}
+    return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}
+
+
+def from_plain(data: Mapping[str, Any]) -> Mobius | SphereMobius:
+    """Return the transformation that `as_plain` gave the data of.
+
+    >>> from_plain(as_plain(Mobius(0.5, 0.3, True)))
+    Mobius(z=(0.5+0j), theta=0.3, reflected=True)
+    """
+    if "h" in data:
+        return SphereMobius(tuple(data["h"]), tuple(data["rotation"]), data["reflected"])
+    return Mobius(complex(*data["z"]), data["theta"], data["reflected"])
 
 
 def _parts(mobius: SphereMobius) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...solver.collection.shapes import Marks
-from ...solver.surface.mesh import Floats
+from ...solver.surface.mesh import Booleans, Floats
 from ..files import Unreadable
 
 
@@ -70,8 +70,8 @@ def _from_lines(path: Path, text: str) -> tuple[list[str], list[list[float]]]:
     return labels, places
 
 
-def write_markups(path: Path, labels: list[str], places: Floats) -> None:
-    """Write the landmarks of one specimen, (l, 3), as 3D Slicer reads them."""
+def write_markups(path: Path, labels: list[str], places: Floats, known: Booleans) -> None:
+    """Write the landmarks of one specimen, (l, 3), as 3D Slicer reads them; those not known, (l,), as missing."""
     points = [
         {
             "id": str(number),
@@ -83,9 +83,9 @@ def write_markups(path: Path, labels: list[str], places: Floats) -> None:
             "selected": True,
             "locked": False,
             "visibility": True,
-            "positionStatus": "defined",
+            "positionStatus": "defined" if has else "missing",
         }
-        for number, (label, place) in enumerate(zip(labels, places, strict=True), 1)
+        for number, (label, place, has) in enumerate(zip(labels, places, known, strict=True), 1)
     ]
     schema = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/"
     data = {
@@ -96,36 +96,36 @@ def write_markups(path: Path, labels: list[str], places: Floats) -> None:
 
 
 def write_csv(path: Path, marks: Marks) -> None:
-    """Write a line per specimen and landmark."""
+    """Write a line per specimen and landmark, without numbers where it is missing."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(["specimen", "landmark", "x", "y", "z"])
-        for name, places in zip(marks.names, marks.places, strict=True):
-            rows.writerows(
-                [name, label, *map(_number, place)] for label, place in zip(marks.labels, places, strict=True)
-            )
+        for name, places in zip(marks.names, _numbers(marks, ""), strict=True):
+            rows.writerows([name, label, *place] for label, place in zip(marks.labels, places, strict=True))
 
 
 def write_tps(path: Path, marks: Marks) -> None:
-    """Write Rohlf's TPS in three dimensions, as tpsSuper and geomorph's readland.tps read it."""
+    """Write Rohlf's TPS in three dimensions, as tpsSuper and geomorph's readland.tps read it; NA: missing."""
     blocks = []
-    for name, places in zip(marks.names, marks.places, strict=True):
-        lines = [f"LM3={len(places)}", *(" ".join(map(_number, place)) for place in places), f"ID={name}"]
+    for name, places in zip(marks.names, _numbers(marks, "NA"), strict=True):
+        lines = [f"LM3={len(places)}", *map(" ".join, places), f"ID={name}"]
         blocks.append("\n".join(lines))
     path.write_text("\n\n".join(blocks) + "\n", encoding="utf-8")
 
 
 def write_morphologika(path: Path, marks: Marks) -> None:
-    """Write the format of Morphologika, as geomorph's read.morphologika reads it."""
+    """Write the format of Morphologika, as geomorph's read.morphologika reads it; NA where one is missing."""
     count, number = marks.places.shape[:2]
     lines = ["[individuals]", str(count), "[landmarks]", str(number), "[dimensions]", "3", "[names]"]
     # a name is a word there
     lines += ["_".join(name.split()) for name in marks.names]
     lines.append("[rawpoints]")
-    for name, places in zip(marks.names, marks.places, strict=True):
-        lines += [f"'{name}", *(" ".join(map(_number, place)) for place in places)]
+    for name, places in zip(marks.names, _numbers(marks, "NA"), strict=True):
+        lines += [f"'{name}", *map(" ".join, places)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _number(value: float) -> str:
-    return format(float(value), ".9g")
+def _numbers(marks: Marks, missing: str) -> list[list[list[str]]]:
+    """Return the coordinates of all landmarks as texts, by specimen and landmark."""
+    numbers = np.vectorize("{:.9g}".format, otypes=[object])(marks.places)
+    return np.where(marks.known[:, :, None], numbers, missing).tolist()

@@ -21,6 +21,9 @@ MOST_PICTURES = 120
 MOST_ROWS = 200
 """Maps not to be trusted that are listed, at most; pairs.csv has all."""
 
+COMPLETED = 0.8
+"""Grey of what a specimen lacks."""
+
 LABELLED, LEGIBLE = 200, 11.0
 """Rows of a matrix up to which they have names, and pixels that each then has at least: what does not fit scrolls."""
 
@@ -61,7 +64,7 @@ def page(collection: Collection, shapes: Shapes) -> str:
 
 def _summary(collection: Collection) -> str:
     certified = sum(known.certified for known in collection.figures)
-    mirrored = sum(known.reflected for known in collection.figures)
+    mirrored = sum(known.mobius.reflected for known in collection.figures)
     levels = [known.judgement.level for known in collection.figures]
     said = f"{plural(len(collection.edges), 'pair')} aligned: {levels.count('good'):,} good, "
     said += f"{levels.count('check'):,} to be checked, {levels.count('doubtful'):,} doubtful by themselves; "
@@ -167,7 +170,14 @@ def _pictures(shapes: Shapes) -> dict[str, str]:
     axes = _upright(mean, shapes.faces, axes)
     colors = corresponding_colors(mean, axes)
     return {
-        shapes.names[k]: inline(thumbnail(poses[k](shapes.vertices[k]), shapes.faces, colors, axes))
+        shapes.names[k]: inline(
+            thumbnail(
+                poses[k](shapes.vertices[k]),
+                shapes.faces,
+                np.where(shapes.known[k][:, None], colors, COMPLETED),
+                axes,
+            )
+        )
         for k in range(min(len(shapes.names), MOST_PICTURES))
     }
 
@@ -182,7 +192,8 @@ def _upright(mean: Floats, faces: Integers, axes: Floats) -> Floats:
 def _shown(collection: Collection, shapes: Shapes, pictures: dict[str, str]) -> str:
     errors = dict(zip(collection.names, collection.specimen_errors, strict=True))
     parts = []
-    for name, turned, certainty in zip(shapes.names, shapes.mirrored, shapes.certainty, strict=True):
+    told = zip(shapes.names, shapes.mirrored, shapes.certainty, shapes.missing, strict=True)
+    for name, turned, certainty, missing in told:
         if name not in pictures:
             continue
         about = [f"certainty {certainty:.2f}"]
@@ -190,11 +201,14 @@ def _shown(collection: Collection, shapes: Shapes, pictures: dict[str, str]) -> 
             about.append(f"cycles {100 * errors[name]:.1f} %")
         if turned:
             about.append("mirrored")
+        if missing >= 0.005:
+            about.append(f"lacks {100 * missing:.0f} %")
         label = f'<span title="{escape(name)}">{escape(short(name, 22))}</span>'
         parts.append(f'<div><img src="{pictures[name]}" width="132" alt=""><br>{label}<br>{", ".join(about)}</div>')
     caption = (
-        "All specimens on one topology, in one pose; equal colors are corresponding points. Certainty: the mean "
-        "confidences along the path, multiplied. Cycles: how far from closed the three-cycles of its maps are."
+        "All specimens on one topology, in one pose; equal colors are corresponding points, and grey is what a "
+        "specimen lacks, completed by the template. Certainty: the mean confidences along the path, multiplied. "
+        "Cycles: how far from closed the three-cycles of its maps are."
     )
     if len(parts) < len(shapes.names):
         caption += f" The first {len(parts)} of {len(shapes.names)}."

@@ -15,12 +15,15 @@ import numpy as np
 from ...solver.collection import Collection
 from ...solver.collection.shapes import Shapes, marks, shapes
 from ...solver.collection.tasks import whole_file
-from ...solver.surface.mesh import Floats, Integers
+from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..files import new_scene
 from ..mesh_data import foreach
 from ..streams import quiet
 from .landmark_tables import write_csv, write_markups, write_morphologika, write_tps
 from .page import page
+
+NOTICED = 0.01
+"""Share of the template that a specimen may lack without a word, as the last row of triangles along a rim is."""
 
 
 def write_results(collection: Collection, landmarks: tuple[str, list[str], Floats] | None) -> list[str]:
@@ -42,7 +45,8 @@ def write_results(collection: Collection, landmarks: tuple[str, list[str], Float
     for number, name in enumerate(common.names):
         mesh = common.mesh(number)
         with whole_file(root / "meshes" / f"{name}.ply") as path:
-            write_ply(path, mesh.vertices, mesh.faces)
+            write_ply(path, mesh.vertices, mesh.faces, common.known[number])
+    notes += _lacking(common)
     mean, _ = common.superimposed
     with whole_file(root / "mean.ply") as path:
         write_ply(path, mean, common.faces)
@@ -84,7 +88,7 @@ def _write_pairs(path: Path, collection: Collection) -> None:
                     f"{known.upper_bound:.6g}",
                     int(known.certified),
                     known.samples,
-                    int(known.reflected),
+                    int(known.mobius.reflected),
                     f"{known.mean_confidence:.4f}",
                     f"{known.coverage:.4f}",
                     f"{known.distance:.6g}",
@@ -99,9 +103,12 @@ def _write_pairs(path: Path, collection: Collection) -> None:
 
 def _write_specimens(path: Path, collection: Collection, common: Shapes) -> None:
     certainty = dict(zip(common.names, common.certainty, strict=True))
+    missing = dict(zip(common.names, common.missing, strict=True))
     turned = dict(zip(common.names, common.mirrored, strict=True))
     with _table(path) as rows:
-        rows.writerow(["specimen", "vertices", "faces", "cycle_error", "path", "mirrored", "certainty", "notes"])
+        rows.writerow(
+            ["specimen", "vertices", "faces", "cycle_error", "path", "mirrored", "missing", "certainty", "notes"]
+        )
         for number, (name, error) in enumerate(zip(collection.names, collection.specimen_errors, strict=True)):
             known = collection.folder.specimens[name]
             route = [collection.names[k] for k in collection.routes.get(number, [])]
@@ -113,29 +120,51 @@ def _write_specimens(path: Path, collection: Collection, common: Shapes) -> None
                     f"{error:.4f}" if np.isfinite(error) else "",
                     " > ".join(route),
                     int(turned[name]) if name in turned else "",
+                    f"{missing[name]:.4f}" if name in missing else "",
                     f"{certainty[name]:.4f}" if name in certainty else "",
                     "; ".join(known["notes"]),
                 ]
             )
-        rows.writerows([name, "", "", "", "", "", "", why] for name, why in collection.failures.items())
+        rows.writerows([name, "", "", "", "", "", "", "", why] for name, why in collection.failures.items())
 
 
-def write_ply(path: Path, vertices: Floats, faces: Integers) -> None:
-    """Write a triangle mesh as a binary .ply in doubles."""
+def _lacking(common: Shapes) -> list[str]:
+    """Return a sentence about specimens that lack more of the template than one notices, if there are any."""
+    order = [int(k) for k in np.argsort(-common.missing) if common.missing[k] > NOTICED]
+    if not order:
+        return []
+    told = ", ".join(f"'{common.names[k]}' {common.missing[k]:.0%}" for k in order[:3])
+    more = f" and {len(order) - 3:,} more" if len(order) > 3 else ""
+    return [
+        f"no counterpart for a part of '{common.names[0]}' on {told}{more}: completed by its shape, and marked so "
+        "(specimens.csv, counterpart in meshes/, attributes in collection.blend)"
+    ]
+
+
+def write_ply(path: Path, vertices: Floats, faces: Integers, counterpart: Booleans | None = None) -> None:
+    """Write a triangle mesh as a binary .ply in doubles; with which vertices, (n,), have a counterpart, if given."""
+    marked = "" if counterpart is None else "property uchar counterpart\n"
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
-        f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        f"property double z\n{marked}element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     )
+    points = np.empty(len(vertices), np.dtype([("place", "<f8", 3), *([("marked", "u1")] if marked else [])]))
+    points["place"] = vertices
+    if counterpart is not None:
+        points["marked"] = counterpart
     rows = np.empty(len(faces), np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
     rows["count"], rows["corners"] = 3, faces
     with path.open("wb") as file:
         file.write(header.encode("ascii"))
-        file.write(np.ascontiguousarray(vertices, "<f8").tobytes())
+        file.write(points.tobytes())
         file.write(rows.tobytes())
 
 
 def _write_blend(path: Path, common: Shapes) -> None:
-    """Write one object in the shape of the mean, with a shape key for each specimen, in the mean's pose and size."""
+    """Write one object in the shape of the mean, with a shape key for each specimen, in the mean's pose and size.
+
+    With an attribute "completed NAME" for each specimen that lacks a part: which of its vertices have no counterpart.
+    """
     mean, poses = common.superimposed
     new_scene()
     mesh = bpy.data.meshes.new("Collection")
@@ -153,6 +182,9 @@ def _write_blend(path: Path, common: Shapes) -> None:
         key = obj.shape_key_add(name=name, from_mix=False)
         key.data.foreach_set("co", pose(vertices).astype(np.float32).ravel())
         key.value = 0.0
+    for name, known in zip(common.names, common.known, strict=True):
+        if not known.all():
+            mesh.attributes.new(f"completed {name}", "BOOLEAN", "POINT").data.foreach_set("value", ~known)
     assert len(foreach(mesh.vertices, "co", 3, np.float32)) == len(mean)
     unfinished = path.with_name(f".{path.stem}.{os.getpid()}.unfinished.blend")
     try:
@@ -169,9 +201,9 @@ def _write_landmarks(root: Path, collection: Collection, landmarks: tuple[str, l
     start, labels, given = landmarks
     placed = marks(collection, collection.names.index(start), labels, given)
     (root / "landmarks").mkdir(exist_ok=True)
-    for name, places in zip(placed.names, placed.places, strict=True):
+    for name, places, known in zip(placed.names, placed.places, placed.known, strict=True):
         with whole_file(root / "landmarks" / f"{name}.mrk.json") as path:
-            write_markups(path, placed.labels, places)
+            write_markups(path, placed.labels, places, known)
     for name, write in (
         ("landmarks.csv", write_csv),
         ("landmarks.tps", write_tps),
@@ -180,6 +212,7 @@ def _write_landmarks(root: Path, collection: Collection, landmarks: tuple[str, l
         with whole_file(root / name) as path:
             write(path, placed)
     far = [f"'{label}' ({off:.0%})" for label, off in zip(labels, placed.off, strict=True) if off > 0.02]
-    if not far:
-        return []
-    return [f"landmarks off '{start}', by how much of its diagonal: {', '.join(far)}; the nearest points are taken"]
+    said = [f"landmarks off '{start}', by how much of its diagonal: {', '.join(far)}; the nearest points are taken"]
+    lost = [f"'{label}' ({n:,})" for label, n in zip(labels, (~placed.known).sum(axis=0), strict=True) if n]
+    gone = [f"landmarks without a counterpart, on how many specimens: {', '.join(lost)}; written as missing there"]
+    return (said if far else []) + (gone if lost else [])

@@ -12,8 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..flatten.distortion import signed_areas
-from ..flatten.flatten import Flattening
 from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
@@ -25,6 +23,7 @@ from .prepared import Surface
 from .reconsider import UNLIKE, unlike
 from .remark import Remark
 from .settings import AlignSettings
+from .side_by_side import flattened, put_in_order
 
 SHRUNK, MUCH = 1e-6, 0.2
 """A surface is too deep for a disc or sphere where this share of its area shrinks there to less than this, beside the
@@ -52,11 +51,15 @@ def fitting_pieces(
     MeshError
         A surface cannot be used as a whole, and has no piece that fits.
     """
-    if all(_is_closed(surface) for surface in (source, target)):
+    clock.begin("flatten source", "Flattening the source", 0.0)
+    put_in_order(source, target, settings, clock.within(0.0, 0.1))
+    closed = [_is_closed(surface) for surface in (source, target)]
+    if closed[0] == closed[1]:
+        flattened(source, target, settings, clock.within(0.1, 0.3))
+    if all(closed):
         if not settings.cut or all(_goes_to_sphere(surface) for surface in (source, target)):
             return source, target, ()
         return like_pieces(source, target, settings, clock) or (source, target, ())  # the sphere says why not
-    clock.begin("flatten source", "Flattening the source", 0.0)
     first = _why_cut(source)
     clock.begin("flatten target", "Flattening the target", 0.3)
     second = _why_cut(target)
@@ -100,10 +103,8 @@ def _goes_to_sphere(surface: Surface) -> bool:
 def shrunk(flattening: Flat) -> float:
     """Return the share of a surface's area that is smaller in its disc or sphere than `SHRUNK` times evenly."""
     mesh = flattening.mesh
-    if isinstance(flattening, Flattening):
-        there, whole = signed_areas(flattening.disc, mesh.faces), np.pi
-    else:
-        there, whole = TriangleMesh(np.nan_to_num(flattening.places), mesh.faces).face_areas, 4 * np.pi
+    whole = 4 * np.pi if flattening.domain.closed else np.pi
+    there = flattening.domain.flat_areas(flattening.places, mesh.faces)
     scale = there / np.maximum(mesh.face_areas, np.finfo(float).tiny)
     return float(mesh.face_areas[scale < SHRUNK * whole / mesh.area].sum() / mesh.area)
 

@@ -28,12 +28,13 @@ DRAFTS = 4
 
 
 def drafted_from(
-    found: Alignment, clock: Part, start: Floats | None = None, count: int = NODES
+    found: Alignment, clock: Part, start: Floats | None = None, count: int = NODES, like: Draft | None = None
 ) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
 
     It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
-    `count` vertices of the target are bent.
+    `count` vertices of the target are bent. What does not depend on the map is taken from another draft of the same
+    surfaces, `like`.
     """
     clock.begin("bend", "Bending", 0.0)
     source, target = found.source, found.target
@@ -45,7 +46,8 @@ def drafted_from(
         found.target_descriptors,
         found.difference,
     )
-    draft = drafted(found.mobius, source, target, believed, start, count=count, progress=clock.within(0.0, 0.15))
+    tell = clock.within(0.0, 0.15)
+    draft = drafted(found.mobius, source, target, believed, start, count=count, progress=tell, like=like)
     return draft, *shared(draft, source, target, clock.within(0.15, 0.2))
 
 
@@ -65,7 +67,8 @@ def bent_densely(
         for _ in range(DRAFTS - 1):
             # pose and scale again, from where the surfaces meet
             believed = np.where(there, 1.0, 1e-3)
-            draft = drafted(found.mobius, source, target, believed, draft.places(), ROUNDS, progress=still)
+            places = draft.places()
+            draft = drafted(found.mobius, source, target, believed, places, ROUNDS, progress=still, like=draft)
             before = here, there
             here, there = shared(draft, source, target, still)
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:

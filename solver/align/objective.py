@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..flatten.sphere import Flat, SphereFlattening
@@ -56,8 +58,13 @@ def interior(flattening: Flat) -> Booleans:
     return inside
 
 
-def source_points(flattening: Flat, descriptors: Floats, count: int) -> Integers:
-    """Return the source points: up to half of them extrema of curvature, the others far from these and each other."""
+def source_points(
+    flattening: Flat, descriptors: Floats, count: int, progress: Callable[[float], None] | None = None
+) -> Integers:
+    """Return the source points: up to half of them extrema of curvature, the others far from these and each other.
+
+    `progress` is called with the share of the points chosen, in [0, 1], and may raise to end it.
+    """
     inside = interior(flattening)
     peaks = extrema(flattening.mesh, descriptors[:, 1], inside)[: count // 2]
-    return farthest_points(flattening.mesh, count, peaks, inside)
+    return farthest_points(flattening.mesh, count, peaks, inside, progress)

@@ -23,6 +23,9 @@ from ..surface.topology import regions
 BEYOND = 0.01
 """How far past the other's boundary, in roots of the source's area, a point has no counterpart: what drafts err by."""
 
+LARGE = 30_000
+"""Points from which on those far from all boundaries of the other surface are not asked for their nearest one."""
+
 
 def shared(
     draft: Draft, source: Flat, target: Flat, progress: Callable[[float], None] | None = None
@@ -35,7 +38,7 @@ def shared(
         return np.ones(len(source.places), bool), np.ones(len(target.places), bool)
     tell = progress or (lambda _: None)
     places = draft.places()
-    bent = TriangleMesh(places, draft.whole.faces)
+    bent = draft.whole.moved(places)
     onto = draft.onto
     back = SurfacePoints(bent, (target.boundary, *target.holes), onto.normal_weight)
     here = ~_left_over(onto.mesh, back, lambda share: tell(share / 2))
@@ -62,6 +65,11 @@ def depth_beyond(
 ) -> Floats:
     """Return how far each point, (q,), lies past a boundary of the surface, measured along it; 0 over the surface."""
     faces, vertices = surface.mesh.faces, surface.mesh.vertices
+    depth = np.zeros(len(points))
+    asked = np.arange(len(points))
+    if len(points) >= LARGE:
+        asked = np.flatnonzero(surface.may_be_beyond(points, normals))
+        points, normals = points[asked], normals[asked]
     face, barycentric = surface.nearest_point(points, normals, progress=progress)
     on_rim = np.zeros(len(vertices), bool)
     on_rim[np.concatenate(surface.loops)] = True
@@ -71,8 +79,7 @@ def depth_beyond(
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), np.finfo(float).tiny)
     step = points[edge] - at
     step -= (step * up).sum(axis=1, keepdims=True) * up
-    depth = np.zeros(len(points))
-    depth[edge] = np.linalg.norm(step, axis=1)
+    depth[asked[edge]] = np.linalg.norm(step, axis=1)
     return depth
 
 

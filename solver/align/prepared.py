@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ..stages import Progress, Stages
 from ..surface.cleaning import LEFT_OUT, cleaned
 from ..surface.descriptors import diffused_curvatures
 from ..surface.fairing import faired
+from ..surface.kept import kept
 from ..surface.mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, plural
 from ..surface.parts import Parts
 from ..surface.sampling import farthest_points
@@ -87,7 +87,7 @@ class Surface:
         """Take from elsewhere what would be computed when it is first asked for."""
         self.__dict__["flattening"] = flattening
 
-    @cached_property
+    @kept
     def cleaned(self) -> Cleaned:
         """The mesh, put in order for the computation; raises `MeshError`."""
         if self.tidy is not None:
@@ -101,12 +101,12 @@ class Surface:
         """Return what some of its faces, (m,) of the mesh in order, are by themselves."""
         return Surface(self.original, fill_holes=self.fill_holes, keys=self.keys, tidy=self.cleaned.only(chosen, said))
 
-    @cached_property
+    @kept
     def parts(self) -> Parts:
         """All parts of the mesh as it was given, the one that is in order first."""
         return Parts.of(self.original, self.cleaned, self.keys)
 
-    @cached_property
+    @kept
     def flattening(self) -> Flat:
         """Of the mesh in order, made fair where it is rough; raises `MeshError`, as for what is too long for a disc."""
         outer = None if self.outer_vertex is None else self.cleaned.vertex_for(self.outer_vertex)
@@ -137,11 +137,11 @@ class Surface:
             self.measured = standardised(measured, self.mesh.vertex_areas)
         return self.measured
 
-    def source_points(self, count: int) -> Integers:
-        """Return up to `count` vertices that stand for it as a source."""
+    def source_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
+        """Return up to `count` vertices that stand for it as a source; `progress` as for `descriptors`."""
         if count not in self.points["source"]:
             self._require_inside()
-            self.points["source"][count] = source_points(self.flattening, self.descriptors(), count)
+            self.points["source"][count] = source_points(self.flattening, self.descriptors(), count, progress)
         return self.points["source"][count]
 
     def target_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:

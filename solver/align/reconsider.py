@@ -8,11 +8,13 @@ than any other by more than chance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
-from ..bend.bend import Draft
+from ..bend.bend import NODES, Draft
 from ..bend.plate import RIM_REACH
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats
@@ -20,6 +22,7 @@ from .alignment import Alignment
 from .dense import bent_densely, drafted_from
 from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, turned, unlike
 from .remark import Remark
+from .side_by_side import Work, side_by_side, stages_of
 
 DOUBTFUL = 0.5
 """Mean confidence up to which the whole map is doubted aloud."""
@@ -106,30 +109,48 @@ def reconsidered(
     found = _without_tie(found)
     if not in_doubt(found):
         return found
+    threads = found.settings.threads != 1
     matched = _without_tie(matched)
-    hypotheses = list(_hypotheses(found, matched, first[0], clock.part(0.0, 0.25, "reconsider")))
+    hypotheses = _hypotheses(found, matched, first[0], clock.part(0.0, 0.25, "reconsider"))
     likely = _screened(found, matched, first, hypotheses, clock.part(0.25, 0.4, "reconsider"))
     rough = unlike(matched, first[0], first[2]) * apart(first[0])
-    drafts = []
-    for number, each in enumerate(likely):
-        part = clock.part(0.4 + 0.1 * number / len(likely), 0.4 + 0.1 * (number + 1) / len(likely))
-        draft = drafted_from(each.alignment, part.part(0.0, 1.0, "reconsider"), each.start)
-        differs = unlike(each.alignment, draft[0], draft[2])
-        if differs <= UNLIKE:
-            drafts.append((differs * apart(draft[0]), each, draft))
-    drafts.sort(key=lambda one: one[0])
+    clock.part(0.4, 0.5, "reconsider").begin("reconsider", "Trying another map", 0.0)
+    works = [partial(_drafted, each, NODES, first[0], UNLIKE) for each in likely]
+    drafts = _in_order(side_by_side(works, clock.within(0.4, 0.5), threads=threads))
     least = min(rough, drafts[0][0]) if drafts else rough
-    bent = [(found, "")]
+    chosen: list[tuple[Hypothesis, _Draft]] = []
     # a map that could not be unfolded may be the right one all the same, and come out from another start
     known = [] if found.unfolded >= UNFOLDED else [first[0].now]
     for score, each, draft in drafts:
         again = any(_same(draft[0].now, other) for other in known)
-        if again or not _fitting(score, least, found, each) or len(bent) > BENT:
-            continue
-        known.append(draft[0].now)
-        part = clock.part(0.5 + (len(bent) - 1) / (2 * BENT), 0.5 + len(bent) / (2 * BENT), "reconsider")
-        bent.append((bent_densely(each.alignment, draft, part, None), each.what))
-    return _decided(bent)
+        if not again and _fitting(score, least, found, each) and len(chosen) < BENT:
+            known.append(draft[0].now)
+            chosen.append((each, draft))
+    works = [partial(_bent, each, draft) for each, draft in chosen]
+    bent = side_by_side(works, clock.within(0.5, 1.0), threads=threads)
+    return _decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
+
+
+_Draft = tuple[Draft, Booleans, Booleans]
+"""As of `drafted_from`."""
+
+_Scored = tuple[float, Hypothesis, _Draft]
+
+
+def _drafted(each: Hypothesis, count: int, like: Draft, most: float, note: Callable[[float], None]) -> _Scored | None:
+    """Return a hypothesis with its draft by so many vertices and how badly that fits; None if it is `most` unlike."""
+    draft = drafted_from(each.alignment, stages_of(note), each.start, count, like)
+    differs = unlike(each.alignment, draft[0], draft[2])
+    return (differs * apart(draft[0]), each, draft) if differs <= most else None
+
+
+def _in_order(drafts: Iterable[_Scored | None]) -> list[_Scored]:
+    """Return the drafts that there are, those that fit best first."""
+    return sorted((one for one in drafts if one is not None), key=lambda one: one[0])
+
+
+def _bent(each: Hypothesis, draft: _Draft, note: Callable[[float], None]) -> Alignment:
+    return bent_densely(each.alignment, draft, stages_of(note), None)
 
 
 def _screened(
@@ -140,25 +161,23 @@ def _screened(
     clock: Part,
 ) -> list[Hypothesis]:
     """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more."""
-    drafts = []
-    for number, each in enumerate(hypotheses):
-        part = clock.part(number / (len(hypotheses) + 1), (number + 1) / (len(hypotheses) + 1))
-        draft, _, there = drafted_from(each.alignment, part, each.start, SCREENED)
-        differs = unlike(each.alignment, draft, there)
-        if differs <= ROUGHLY * UNLIKE:
-            drafts.append((differs * apart(draft), each, draft))
-    drafts.sort(key=lambda one: one[0])
+    if not hypotheses:
+        return []
+    begun, _, there = drafted_from(matched, clock.part(0.0, 0.1), None, SCREENED, first[0])
+    least = unlike(matched, begun, there) * apart(begun)
+    clock.begin("reconsider", "Trying another map", 0.1)
+    works = [partial(_drafted, each, SCREENED, begun, ROUGHLY * UNLIKE) for each in hypotheses]
+    drafts = _in_order(side_by_side(works, clock.within(0.1, 1.0), threads=found.settings.threads != 1))
     known = [] if found.unfolded >= UNFOLDED else [first[0].places()]
     others = []
-    for score, each, draft in drafts:
+    for score, each, (draft, *_) in drafts:
         places = draft.places()
         if not any(_same(places[draft.few.nodes], other[draft.few.nodes]) for other in known):
             known.append(places)
             others.append((score, each))
-    if all(_fitting(np.inf, 0.0, found, each) for _, each in others):
-        return [each for _, each in others]
-    draft, _, there = drafted_from(matched, clock.part(0.9, 1.0), None, SCREENED)
-    least = ROUGHLY * min(unlike(matched, draft, there) * apart(draft), others[0][0])
+    if not others:
+        return []
+    least = ROUGHLY * min(least, others[0][0])
     return [each for score, each in others if _fitting(score, least, found, each)]
 
 
@@ -177,21 +196,28 @@ def _same(one: Floats, two: Floats) -> bool:
     return bool(np.median(np.linalg.norm(one - two, axis=1)) < SAME)
 
 
-def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part) -> Iterator[Hypothesis]:
-    """Yield what else the map might be: the likelier the map is wrong, the more."""
+def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part) -> list[Hypothesis]:
+    """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
-    other = turned(matched)
-    if other is not None:
-        yield Hypothesis(other, None, "the mirrored one" if other.mobius.reflected else "the one that is not mirrored")
-        if matched.mobius.reflected:
-            yield from further(other, MAXIMA - 1, clock.part(0.0, 0.5))
-            opposite = by_own_mirror(matched, draft)
-            if opposite is not None:
-                yield opposite
+
+    def mirrored(note: Callable[[float], None]) -> list[Hypothesis]:
+        other = turned(matched)
+        if other is None:
+            return []
+        what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
+        first = Hypothesis(other, None, what)
+        if not matched.mobius.reflected:
+            return [first]
+        opposite = by_own_mirror(matched, draft)
+        return [first, *further(other, MAXIMA - 1, stages_of(note)), *([] if opposite is None else [opposite])]
+
+    works: list[Work[list[Hypothesis]]] = [mirrored]
     if found.mean_confidence < FITS:
-        yield by_pose(matched, draft.onto)
+        works.append(lambda _: [by_pose(matched, draft.onto)])
     if found.mean_confidence <= DOUBTFUL:
-        yield from further(matched, MAXIMA, clock.part(0.5, 1.0))
+        works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
+    some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
+    return list(chain.from_iterable(some))
 
 
 def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:

@@ -44,7 +44,8 @@ class AlignSettings:
         `reflect_margin`: then their values are the best there are. Dense refinement, which may go on with one of them,
         does so whatever this says.
     threads : int, optional
-        Of each search, which finds the same with any number; by default one for each processor.
+        Of each search, which finds the same with any number; by default one for each processor. Source and target, if
+        large, are prepared at the same time unless it is 1.
     refine : str
         "none": the search's transformation; "mobius": improved on all vertices; "dense": then the target is bent onto
         the source, smoothly and without folds.

@@ -86,6 +86,8 @@ class Draft:
         The nodes among `unbent`, with faces between them.
     rest, now : (q, 3) float64
         The nodes in the source's pose, and bent.
+    count : int
+        How many nodes were asked for.
     """
 
     onto: SurfacePoints
@@ -97,6 +99,7 @@ class Draft:
     flat: TriangleMesh
     rest: Floats
     now: Floats
+    count: int
 
     def places(self) -> Floats:
         """Return where all target vertices are, (n, 3), in the frame of `onto`; 0 at vertices in no face."""
@@ -124,6 +127,7 @@ def drafted(
     rounds: int = DRAFT_ROUNDS,
     count: int = NODES,
     progress: Callable[[float], None] | None = None,
+    like: Draft | None = None,
 ) -> Draft:
     """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
 
@@ -148,22 +152,21 @@ def drafted(
         Target vertices that are bent.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
+    like : Draft, optional
+        Another draft of the same surfaces, from whatever map: what does not depend on that is taken from it.
     """
     tell = progress or (lambda _: None)
-    about = source.boundary if len(source.boundary) else source.mesh.used
-    middle = source.mesh.vertices[about].mean(axis=0)
-    onto = SurfacePoints(
-        TriangleMesh((source.mesh.vertices - middle) / np.sqrt(source.mesh.area), source.mesh.faces),
-        source.loops,
-        NORMAL_WEIGHT,
-    )
+    onto = ready(source) if like is None else like.onto
     used = np.flatnonzero(target.mesh.used)
     conformal = target.domain.nowhere(len(target.places))
     conformal[used] = mobius.inverse()(target.places[used])
     whole, order = facing(target.mesh, mobius.reflected)
 
     tell(0.0)
-    few = coarse(target, count, order)
+    if like is None or like.count != count:
+        few = coarse(target, count, order)
+    else:
+        few = like.few if np.array_equal(like.whole.faces, whole.faces) else like.few.turned()
     nodes, faces = few.nodes, few.faces
     tell(0.0)
     places = _positions(conformal[nodes], source, onto) if start is None else start[nodes]
@@ -178,13 +181,22 @@ def drafted(
     tell(0.0)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
-    return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now)
+    return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now, count)
+
+
+def ready(source: Flat) -> SurfacePoints:
+    """Return the source about the middle of its boundary, in roots of its area, for what is bent onto it."""
+    about = source.boundary if len(source.boundary) else source.mesh.used
+    middle = source.mesh.vertices[about].mean(axis=0)
+    places = (source.mesh.vertices - middle) / np.sqrt(source.mesh.area)
+    return SurfacePoints(source.mesh.moved(places), source.loops, NORMAL_WEIGHT)
 
 
 def facing(mesh: TriangleMesh, reflected: bool) -> tuple[TriangleMesh, list[int]]:
     """Return the mesh, mirrored back with its faces turned if it is reflected, so that normals agree; their order."""
-    mirror, order = ([-1, 1, 1], [0, 2, 1]) if reflected else ([1, 1, 1], [0, 1, 2])
-    return TriangleMesh(mesh.vertices * mirror, mesh.faces[:, order]), order
+    if not reflected:
+        return mesh, [0, 1, 2]
+    return TriangleMesh(mesh.vertices * [-1, 1, 1], mesh.faces[:, [0, 2, 1]]), [0, 2, 1]
 
 
 def _best_start(

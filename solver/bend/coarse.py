@@ -6,7 +6,7 @@ has the size of a point. Then they are found on the surface itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -43,6 +43,10 @@ class Coarse:
     vertices: Integers
     leaders: Integers
     weights: Floats
+
+    def turned(self) -> Coarse:
+        """Return the same with its triangles the other way round."""
+        return replace(self, faces=self.faces[:, [0, 2, 1]])
 
     def following(self, rest: Floats, now: Floats, unbent: Floats) -> Floats:
         """Return where all vertices, (n, 3), go when the nodes move from `rest`, (q, 3), to `now`.

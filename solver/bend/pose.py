@@ -88,16 +88,17 @@ def misfit(mesh: TriangleMesh, onto: SurfacePoints, most: int = MOST) -> float:
     Distances count up to `FAR`; normals by the surface's own weight. `most`: how many vertices of each are asked.
     """
     back = SurfacePoints(mesh, (), onto.normal_weight)
-    return (_mean_distance(mesh, onto, most) + _mean_distance(onto.mesh, back, most)) / 2
+    return (_mean_distance(back, onto, most) + _mean_distance(onto, back, most)) / 2
 
 
-def _mean_distance(mesh: TriangleMesh, onto: SurfacePoints, most: int) -> float:
+def _mean_distance(surface: SurfacePoints, onto: SurfacePoints, most: int) -> float:
+    mesh = surface.mesh
     some = slice(None, None, -(-len(mesh.vertices) // most))
-    points, normals = mesh.vertices[some], mesh.vertex_normals()[some]
+    points, normals = mesh.vertices[some], surface.normals[some]
     face, barycentric = onto.most_alike(points, normals)
     corners = onto.mesh.faces[face]
     point = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners])
-    normal = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertex_normals()[corners])
+    normal = np.einsum("qk,qkd->qd", barycentric, onto.normals[corners])
     square = ((point - points) ** 2).sum(axis=1) + onto.normal_weight**2 * ((normal - normals) ** 2).sum(axis=1)
     areas = mesh.vertex_areas[some]
     return float(areas @ np.minimum(np.sqrt(square), FAR) / areas.sum())

@@ -11,7 +11,7 @@ from ..align.alignment import Alignment
 from ..align.confidence import expected_error
 from ..align.judgement import judge
 from ..align.whole import Whole
-from ..mobius import Mobius, SphereMobius
+from ..mobius import as_plain
 from ..search.outcome import SphereSearchResult
 from ..surface.mesh import Booleans
 from ..surface.parts import Parts
@@ -71,11 +71,11 @@ def report(alignment: Alignment, correspondence: Correspondence) -> dict[str, An
         "targets": len(alignment.target_samples),
         "matches": len(alignment.matches),
         "nodes": found.nodes,
-        "mobius": _plain(alignment.mobius),
+        "mobius": as_plain(alignment.mobius),
         "orientation_margin": alignment.margin,
         "rival": None
         if alignment.rival is None
-        else {"value": alignment.rival.value, "mobius": _plain(alignment.rival.mobius)},
+        else {"value": alignment.rival.value, "mobius": as_plain(alignment.rival.mobius)},
         "rival_margin": decisive.rival_margin,
         "cut_to": {"source": _share(alignment.source_cleaned), "target": _share(tidy)},
         "overlap": None
@@ -139,9 +139,3 @@ def _part(parts: Parts, number: int | None) -> dict[str, Any] | None:
 def _share(tidy: Cleaned | None) -> float:
     """Return the share of the whole that was aligned, where that is a piece that was cut out."""
     return 1.0 if tidy is None else tidy.share
-
-
-def _plain(mobius: Mobius | SphereMobius) -> dict[str, Any]:
-    if isinstance(mobius, SphereMobius):
-        return {"h": list(mobius.h), "rotation": list(mobius.rotation), "reflected": mobius.reflected}
-    return {"z": [mobius.z.real, mobius.z.imag], "theta": mobius.theta, "reflected": mobius.reflected}

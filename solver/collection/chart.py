@@ -1,4 +1,7 @@
-"""Specimens and the maps between them, in their discs: points carried either way, and along paths."""
+"""Specimens and the maps between them, in their discs or spheres: points carried either way, and along paths.
+
+Where a map has no counterpart for a point, it says so beside the nearest that it has.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,16 @@ from functools import cached_property
 
 import numpy as np
 
+from ..align.confidence import BOUND
 from ..align.prepared import Surface
+from ..flatten.domain import Domain
 from ..flatten.locate import TriangulatedDisc
-from ..flatten.sphere import require_open
-from ..mobius import Mobius
-from ..surface.mesh import Complexes, Floats, Integers
+from ..mobius import Mobius, SphereMobius
+from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned
+
+Carried = tuple[Places, Booleans]
+"""Places in a domain, (q,), and which of these are counterparts, (q,); the others are the nearest that there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +29,11 @@ class Chart:
 
     Attributes
     ----------
+    domain : Domain
     vertices : (n, 3) float64
         Of the mesh in order, where they are.
-    disc : (n,) complex128
+    places : (n,) complex128 or (n, 3) float64
+        Where they are in the domain.
     faces : (m, 3) int
     areas : (n,) float64
         Around the vertices.
@@ -35,8 +44,9 @@ class Chart:
         How it relates to the mesh as it came.
     """
 
+    domain: Domain
     vertices: Floats
-    disc: Complexes
+    places: Places
     faces: Integers
     areas: Floats
     samples: Integers
@@ -46,69 +56,93 @@ class Chart:
     @staticmethod
     def of(surface: Surface, samples: int) -> Chart:
         """Return the chart of a prepared surface with its points chosen for a search."""
-        flat, tidy = require_open(surface.flattening), surface.cleaned
+        flat, tidy = surface.flattening, surface.cleaned
         mesh = tidy.mesh
         chosen = surface.source_points(samples)
-        return Chart(mesh.vertices, flat.disc, mesh.faces, mesh.vertex_areas, chosen, mesh.diagonal, tidy)
+        return Chart(
+            flat.domain, mesh.vertices, flat.places, mesh.faces, mesh.vertex_areas, chosen, mesh.diagonal, tidy
+        )
 
     @cached_property
-    def located(self) -> TriangulatedDisc:
-        """The disc, prepared for point location."""
-        return TriangulatedDisc.of(self.disc, self.faces)
+    def triangles(self) -> TriangulatedDisc:
+        """The triangles in the domain, prepared for point location."""
+        return self.domain.triangulated(self.places, self.faces)
 
-    def places(self, points: Complexes) -> Floats:
-        """Return where points of the disc, (q,), lie on the surface, (q, 3)."""
-        face, weights = self.located.locate(points)
+    def positions(self, places: Places) -> Floats:
+        """Return where points of the domain, (q,), lie on the surface, (q, 3)."""
+        face, weights = self.triangles.locate(places)
         return np.einsum("qk,qkd->qd", weights, self.vertices[self.faces[face]])
 
 
 @dataclass(frozen=True, eq=False)
-class DiscMap:
-    """A map between two specimens' discs.
+class ChartMap:
+    """A map between two specimens' domains.
 
     Attributes
     ----------
     source, target : Chart
-    mobius : Mobius
-        Carries the source's disc to the target's, where nothing is known beyond it.
-    carried : (n_target,) complex128 or None
-        Where the target's vertices go in the source's disc, by a dense map; nan at vertices in no face.
+    mobius : Mobius or SphereMobius
+        Carries the source's domain to the target's, where nothing is known beyond it; else it counts whether it is
+        reflected.
+    carried : (n_target,) complex128, (n_target, 3) float64 or None
+        Where the target's vertices go in the source's domain, by a dense map; nan at vertices in no face.
+    paired : (n_target,) bool or None
+        Which of them have a counterpart there, not only the nearest point that one has; None: all.
     """
 
     source: Chart
     target: Chart
-    mobius: Mobius
-    carried: Complexes | None = None
+    mobius: Mobius | SphereMobius
+    carried: Places | None = None
+    paired: Booleans | None = None
 
-    def backward(self, points: Complexes) -> Complexes:
-        """Return where points of the target's disc, (q,), go in the source's."""
+    def backward(self, points: Places) -> Carried:
+        """Return where points of the target's domain, (q,), go in the source's."""
         if self.carried is None:
-            return self.mobius.inverse()(points)
-        face, weights = self.target.located.locate(points)
-        return (weights * self.carried[self.target.faces[face]]).sum(axis=1)
+            return self.mobius.inverse()(points), np.ones(len(points), bool)
+        face, weights = self.target.triangles.locate(points)
+        corners = self.target.faces[face]
+        places = self.source.domain.mean(self.carried, corners, weights)
+        return places, (weights * self._paired[corners]).sum(axis=1) > 0.5
 
-    def forward(self, points: Complexes) -> Complexes:
-        """Return where points of the source's disc, (q,), go in the target's."""
+    def forward(self, points: Places) -> Carried:
+        """Return where points of the source's domain, (q,), go in the target's.
+
+        What lies farther from the image of the target than maps may err has no counterpart.
+        """
         if self.carried is None:
-            return self.mobius(points)
-        face, weights = self._image.locate(np.conj(points) if self.mobius.reflected else points)
-        return (weights * self.target.disc[self.target.faces[face]]).sum(axis=1)
+            return self.mobius(points), np.ones(len(points), bool)
+        face, weights = self._image.locate(self._seen(points))
+        corners = self._image.faces[face]
+        nearest = self.source.domain.mean(self.carried, corners, weights)
+        apart = np.linalg.norm(self.source.positions(nearest) - self.source.positions(points), axis=1)
+        known = (apart <= BOUND * self.source.diagonal) & self._paired.any()
+        return self.target.domain.mean(self.target.places, corners, weights), known
+
+    @cached_property
+    def _paired(self) -> Booleans:
+        return np.ones(len(self.target.places), bool) if self.paired is None else self.paired
+
+    def _seen(self, places: Places) -> Places:
+        return self.source.domain.reflected(places) if self.mobius.reflected else places
 
     @cached_property
     def _image(self) -> TriangulatedDisc:
-        """The target's triangles where they go, turned round again if they are mirrored."""
+        """The target's triangles that have a counterpart where they go, turned round again if they are mirrored."""
         assert self.carried is not None
-        return TriangulatedDisc.of(np.conj(self.carried) if self.mobius.reflected else self.carried, self.target.faces)
+        faces = self.target.faces
+        some = self._paired[faces].all(axis=1)
+        return self.source.domain.triangulated(self._seen(self.carried), faces[some] if some.any() else faces)
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """One map of a path, in the direction in which it is walked."""
 
-    map: DiscMap
+    map: ChartMap
     backward: bool
 
-    def __call__(self, points: Complexes) -> Complexes:
+    def __call__(self, points: Places) -> Carried:
         """Return where points go."""
         return self.map.backward(points) if self.backward else self.map.forward(points)
 
@@ -118,11 +152,16 @@ class Step:
         return self.map.source if self.backward else self.map.target
 
 
-def carried_along(points: Complexes, path: Sequence[Step]) -> Complexes:
-    """Return where points of the disc of a path's first specimen, (q,), go in that of its last."""
+def carried_along(points: Places, path: Sequence[Step]) -> Carried:
+    """Return where points of the domain of a path's first specimen, (q,), go in that of its last.
+
+    A point has a counterpart there if it has one at every step.
+    """
+    known = np.ones(len(points), bool)
     for step in path:
-        points = step(points)
-    return points
+        points, here = step(points)
+        known &= here
+    return points, known
 
 
 def mirrored(path: Sequence[Step]) -> bool:

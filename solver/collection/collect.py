@@ -223,4 +223,6 @@ def _checked(
     atlas = Atlas(folder, names, found, settings.samples)
     cycles = triangles(edges)
     open_by = np.array([closing_error(atlas, cycle) for cycle in cycles.tolist()], np.float64)
+    told = np.isfinite(open_by)  # the others have nothing in common
+    cycles, open_by = cycles[told], open_by[told]
     return edge_errors(edges, cycles, open_by), (cycles, open_by)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..surface.mesh import Booleans, Floats, Integers
-from .chart import DiscMap, Step, carried_along
+from .chart import ChartMap, Step, carried_along
 
 Edge = tuple[int, int]
 """Numbers of the specimens of a pair: of source and target."""
@@ -56,25 +56,28 @@ def _ascending(a: int, b: int, c: int) -> tuple[int, int, int]:
     return first, second, third
 
 
-def step(maps: Mapping[Edge, DiscMap], start: int, end: int) -> Step:
+def step(maps: Mapping[Edge, ChartMap], start: int, end: int) -> Step:
     """Return the map from one specimen to another, in whichever direction it was found."""
     if (start, end) in maps:
         return Step(maps[start, end], backward=False)
     return Step(maps[end, start], backward=True)
 
 
-def closing_error(maps: Mapping[Edge, DiscMap], cycle: Sequence[int]) -> float:
+def closing_error(maps: Mapping[Edge, ChartMap], cycle: Sequence[int]) -> float:
     """Return how far points come to lie from where they were, round specimens, on average, in diagonals of the first.
 
-    1 where the cycle turns orientation round, which nothing can be further from.
+    Of those that have counterparts all the way; nan where none has. 1 where the cycle turns orientation round, which
+    nothing can be further from.
     """
     path = [step(maps, a, b) for a, b in zip(cycle, [*cycle[1:], cycle[0]], strict=True)]
     if sum(s.map.mobius.reflected for s in path) % 2:
         return 1.0
     chart = path[-1].end
-    start = chart.disc[chart.samples]
-    back = chart.places(carried_along(start, path))
-    return float(np.linalg.norm(back - chart.vertices[chart.samples], axis=1).mean() / chart.diagonal)
+    back, known = carried_along(chart.places[chart.samples], path)
+    if not known.any():
+        return np.nan
+    apart = np.linalg.norm(chart.positions(back) - chart.vertices[chart.samples], axis=1)
+    return float(apart[known].mean() / chart.diagonal)
 
 
 def edge_errors(edges: Sequence[Edge], cycles: Integers, errors: Floats) -> Floats:

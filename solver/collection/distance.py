@@ -12,15 +12,13 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, dia_array
+from scipy.sparse import csc_array, csr_array, dia_array
 from scipy.spatial import KDTree
 
-from ..flatten.distortion import signed_areas
-from ..flatten.flatten import Flattening
-from ..flatten.locate import plane
+from ..flatten.sphere import Flat
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
-from ..surface.mesh import Complexes, Floats, Integers
+from ..surface.mesh import Floats, Integers, Places
 from .procrustes import superimposing
 
 STEPS = 4
@@ -45,14 +43,14 @@ class EvenFlow:
 
     Moser, "On the volume elements on a manifold" (1965): let u solve -div grad u = m - 1, where m is the carried area
     over the surface's own; then flowing for t from 0 to 1 with the velocity -grad u / ((1 - t) m + t) carries m to 1.
-    Potentials and gradients are those of piecewise linear functions; the flow is followed in the disc.
+    Potentials and gradients are those of piecewise linear functions; the flow is followed in the disc or sphere.
 
     Parameters
     ----------
-    surface : Flattening
+    surface : Flat
     """
 
-    def __init__(self, surface: Flattening) -> None:
+    def __init__(self, surface: Flat) -> None:
         self.surface = surface
         self.areas = surface.mesh.vertex_areas / surface.mesh.area
         self.vertices = surface.mesh.vertices if surface.exact is None else surface.exact
@@ -68,12 +66,12 @@ class EvenFlow:
         spread = SPREAD / np.count_nonzero(self.surface.mesh.used)
         return factorised(csc_array(mass + spread * stiffness)), factorised(csc_array(stiffness + GROUND * mass))
 
-    def evened(self, places: Complexes, face: Integers, barycentric: Floats, areas: Floats) -> Complexes:
-        """Return where the flow takes places in the disc, (q,).
+    def evened(self, places: Places, face: Integers, barycentric: Floats, areas: Floats) -> Places:
+        """Return where the flow takes places in the domain, (q,).
 
         Parameters
         ----------
-        places : (q,) complex128
+        places : (q,) complex128 or (q, 3) float64
         face, barycentric, areas : (k,) int, (k, 3) float64, (k,) float64
             The area, of a total of 1, that was carried to points of the surface.
         """
@@ -86,38 +84,33 @@ class EvenFlow:
         slope = potential(lumps - self.areas * lumps.sum())
         density = np.maximum(density, LEAST)
         drift = -self._gradient(slope)
+        moved = self.surface.domain.moved
         for step in range(STEPS):
-            middle = places + self._velocity(drift, density, places, step / STEPS) / (2 * STEPS)
-            places = places + self._velocity(drift, density, middle, (step + 0.5) / STEPS) / STEPS
-            places = places / np.maximum(np.abs(places), 1.0)
+            middle = moved(places, self._velocity(drift, density, places, step / STEPS) / (2 * STEPS))
+            places = moved(places, self._velocity(drift, density, middle, (step + 0.5) / STEPS) / STEPS)
         return places
 
-    def _velocity(self, drift: Complexes, density: Floats, places: Complexes, time: float) -> Complexes:
+    def _velocity(self, drift: Places, density: Floats, places: Places, time: float) -> Places:
         face, weights = self.surface.triangles.locate(places)
         corners = self.surface.mesh.faces[face]
-        flow = (weights * drift[corners]).sum(axis=1)
-        return flow / ((1 - time) * (weights * density[corners]).sum(axis=1) + time)
+        there = (1 - time) * (weights * density[corners]).sum(axis=1) + time
+        return np.einsum("qk,qk...->q...", weights / there[:, None], drift[corners])
 
-    def _gradient(self, values: Floats) -> Complexes:
-        """Return the surface's gradient of values at vertices, (n,), as motion in the disc: means over the faces."""
-        faces, disc = self.surface.mesh.faces, self.surface.disc
-        opposite = disc[faces[:, [2, 0, 1]]] - disc[faces[:, [1, 2, 0]]]
-        # twice the disc's area times the gradient there; turned to the surface's by the squared conformal factor,
-        # which is the quotient of the areas
-        flux = 1j * (opposite * values[faces]).sum(axis=1) / 2
-        turned = signed_areas(disc, faces) > 0
-        flux[~turned] = 0
-        size = len(values)
-        total = np.bincount(faces.ravel(), np.repeat(self.surface.mesh.face_areas / self.surface.mesh.area, 3), size)
-        sums = np.bincount(faces.ravel(), np.repeat(flux.real, 3), size) + 1j * np.bincount(
-            faces.ravel(), np.repeat(flux.imag, 3), size
-        )
-        return sums / np.where(total > 0, total, 1.0)
+    def _gradient(self, values: Floats) -> Places:
+        """Return the surface's gradient of values at vertices, (n,), as motion in the domain: means over the faces."""
+        faces, places = self.surface.mesh.faces, self.surface.places
+        # the gradient in the domain becomes the surface's by the squared conformal factor, the quotient of the areas:
+        # what is summed over a vertex's faces is the gradient there times the area there
+        there = np.maximum(self.surface.domain.flat_areas(places, faces), 0.0)
+        gradient = self.surface.domain.gradients(places, faces, values[:, None])[..., 0]
+        corner = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
+        share = np.repeat(there / 3, 3) / np.where(self.areas > 0, self.areas, 1.0)[corner[0]]
+        return csr_array((share, corner), shape=(len(values), len(faces))) @ gradient
 
 
 def continuous_procrustes(
     source: EvenFlow,
-    target: Flattening,
+    target: Flat,
     located: tuple[Integers, Floats],
     *,
     mirrored: bool,
@@ -129,7 +122,7 @@ def continuous_procrustes(
     ----------
     source : EvenFlow
         Of the surface that is mapped to.
-    target : Flattening
+    target : Flat
     located : (n_target,) int, (n_target, 3) float64
         The source's face, and where in it, that each target vertex goes to; -1 where it goes nowhere.
     mirrored : bool
@@ -143,13 +136,14 @@ def continuous_procrustes(
     areas = target.mesh.vertex_areas[known]
     areas = areas / areas.sum()
     corners = source.surface.mesh.faces
-    start = (barycentric[points] * source.surface.disc[corners[face[points]]]).sum(axis=1)
+    start = source.surface.domain.mean(source.surface.places, corners[face[points]], barycentric[points])
     ends, weights = source.surface.triangles.locate(source.evened(start, face[known], barycentric[known], areas))
     onto = np.einsum("qk,qkd->qd", weights, source.vertices[corners[ends]]) / np.sqrt(source.surface.mesh.area)
     exact = target.mesh.vertices if target.exact is None else target.exact
     here = exact[points] / np.sqrt(target.mesh.area)
     # each vertex's area counts at the nearest of the points
-    nearest = KDTree(plane(target.disc[points])).query(plane(target.disc[known]))[1]
+    spots = target.domain.coordinates(target.places)
+    nearest = KDTree(spots[points]).query(spots[known])[1]
     share = np.bincount(np.asarray(nearest), areas, len(points)).astype(np.float64, copy=False)
     moved = superimposing(here, onto, share, mirrored=mirrored)(here)
     return float(np.sqrt(share @ ((moved - onto) ** 2).sum(axis=1)))

@@ -27,7 +27,7 @@ from .tasks import Result, whole_file
 PREPARING = ("samples", "targets", "fill_holes")
 """Settings that prepared surfaces depend on."""
 
-VERSION = 3
+VERSION = 4
 """Of the lines and of what is computed for them: those of another version are done anew."""
 
 

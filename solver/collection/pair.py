@@ -8,8 +8,7 @@ from typing import Any
 from ..align.alignment import Alignment
 from ..align.judgement import Judgement, coverage, judged
 from ..align.remark import Remark
-from ..flatten.sphere import require_open
-from ..mobius import Mobius
+from ..mobius import Mobius, SphereMobius, as_plain, from_plain
 from .distance import EvenFlow, continuous_procrustes
 
 
@@ -25,8 +24,8 @@ class Figures:
         Whether the two are the same, and this the map gone on with.
     samples : int
         What Q is at most.
-    z, theta, reflected : complex as (float, float), float, bool
-        The Möbius map from the source's disc to the target's.
+    mobius : Mobius or SphereMobius
+        The map from the source's disc or sphere to the target's: of what was aligned, which may be pieces of them.
     mean_confidence : float
         Where the map claims anything.
     coverage : float
@@ -35,6 +34,8 @@ class Figures:
         Continuous Procrustes distance by this map.
     dense : bool
         Whether the map was bent beyond Möbius.
+    written : bool
+        Whether it is in a file: a dense one, and one of other discs than the specimens were prepared with.
     seconds : float
         Of one processor.
     remarks : tuple of Remark
@@ -44,20 +45,14 @@ class Figures:
     upper_bound: float
     certified: bool
     samples: int
-    z: tuple[float, float]
-    theta: float
-    reflected: bool
+    mobius: Mobius | SphereMobius
     mean_confidence: float
     coverage: float
     distance: float
     dense: bool
+    written: bool
     seconds: float
     remarks: tuple[Remark, ...] = ()
-
-    @property
-    def mobius(self) -> Mobius:
-        """The Möbius map from the source's disc to the target's."""
-        return Mobius(complex(*self.z), self.theta, self.reflected)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -76,24 +71,23 @@ class Figures:
 
     def plain(self) -> dict[str, Any]:
         """Return the figures as JSON-ready data."""
-        return asdict(self)
+        return {**vars(self), "mobius": as_plain(self.mobius), "remarks": [asdict(one) for one in self.remarks]}
 
     @staticmethod
     def read(data: dict[str, Any]) -> Figures:
         """Return the figures from what `plain` gave."""
-        return Figures(**{**data, "z": tuple(data["z"]), "remarks": tuple(Remark(**one) for one in data["remarks"])})
+        remarks = tuple(Remark(**one) for one in data["remarks"])
+        return Figures(**{**data, "mobius": from_plain(data["mobius"]), "remarks": remarks})
 
 
-def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
+def figures(alignment: Alignment, flow: EvenFlow, seconds: float, *, written: bool) -> Figures:
     """Return what is known of a pair that was aligned; `flow` is that of its source."""
     decisive = alignment if alignment.overlap is None else alignment.overlap.alignment
-    mobius = alignment.mobius
-    assert isinstance(mobius, Mobius)  # of discs
     distance = continuous_procrustes(
         flow,
-        require_open(alignment.target),
+        alignment.target,
         alignment.located,
-        mirrored=mobius.reflected,
+        mirrored=alignment.mobius.reflected,
         points=alignment.target_samples[: alignment.settings.targets],
     )
     return Figures(
@@ -101,13 +95,12 @@ def figures(alignment: Alignment, flow: EvenFlow, seconds: float) -> Figures:
         upper_bound=alignment.search.upper_bound,
         certified=alignment.certified,
         samples=len(alignment.source_samples),
-        z=(mobius.z.real, mobius.z.imag),
-        theta=mobius.theta,
-        reflected=mobius.reflected,
+        mobius=alignment.mobius,
         mean_confidence=alignment.mean_confidence,
         coverage=coverage(alignment),
         distance=distance,
         dense=decisive.bending is not None,
+        written=written,
         seconds=seconds,
         remarks=alignment.remarks,
     )

@@ -22,7 +22,6 @@ from ..align.settings import AlignSettings
 from ..align.surface_file import load_surface, save_surface
 from ..carry.correspond import correspond
 from ..carry.map_file import save_map
-from ..flatten.sphere import require_open
 from ..surface.mesh import Floats, MeshError, TriangleMesh
 from .distance import EvenFlow
 from .pair import figures
@@ -47,12 +46,12 @@ class Prepare:
 
 @dataclass(frozen=True)
 class Compare:
-    """Align the prepared surfaces in two files; write the dense map to `map_path`, if it is given."""
+    """Align the prepared surfaces in two files; write the map to `map_path` if these alone do not tell it."""
 
     source: str
     target: str
     settings: dict[str, Any]
-    map_path: str | None = None
+    map_path: str
 
 
 Task = Prepare | Compare
@@ -113,7 +112,7 @@ def _prepare(task: Prepare) -> Result:
     begun = time.process_time()
     mesh, keys = _read_mesh(Path(task.mesh), task.name)
     surface = prepare(mesh, AlignSettings(**task.settings), largest_part=task.largest_part, keys=keys)
-    require_open(surface.flattening)
+    _ = surface.flattening  # or why there is none
     with whole_file(Path(task.path)) as path:
         save_surface(path, surface)
     return {
@@ -133,7 +132,7 @@ class _Known:
 
     @cached_property
     def flow(self) -> EvenFlow:
-        return EvenFlow(require_open(self.surface.flattening))
+        return EvenFlow(self.surface.flattening)
 
 
 @lru_cache(maxsize=KEPT)
@@ -149,11 +148,15 @@ def _compare(task: Compare) -> Result:
     source, target = _known(task.source), _known(task.target)
     begun = time.process_time()
     alignment = align(source.surface, target.surface, AlignSettings(**task.settings))
-    if task.map_path is not None:
+    # of pieces, or of surfaces joined at the lips, there are other discs than those that were prepared
+    prepared = [alignment.source is source.surface.flattening, alignment.target is target.surface.flattening]
+    written = alignment.settings.refine == "dense" or not all(prepared)
+    if written:
         with whole_file(Path(task.map_path)) as path:
             originals = source.surface.original, target.surface.original
             save_map(path, alignment, correspond(alignment), *originals)
-    found = figures(alignment, source.flow, 0.0)
+    flow = source.flow if prepared[0] else EvenFlow(alignment.source)
+    found = figures(alignment, flow, 0.0, written=written)
     return {**found.plain(), "seconds": time.process_time() - begun}
 
 

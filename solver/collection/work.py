@@ -76,8 +76,7 @@ class Work:
             for edge in _in_blocks(new):
                 source, target = (names[k] for k in edge)
                 here, there = (str(self.folder.surface(name).resolve()) for name in (source, target))
-                dense = str(self.folder.dense_map(source, target).resolve()) if settings.refine == "dense" else None
-                yield edge, Compare(here, there, given, dense)
+                yield edge, Compare(here, there, given, str(self.folder.dense_map(source, target).resolve()))
 
         for edge, result in completed(tasks(), self.opened, self.at_a_time):
             line = self.folder.add_pair(names[edge[0]], names[edge[1]], asked, result)
@@ -86,7 +85,7 @@ class Work:
         return found
 
     def _map_is_missing(self, line: Result) -> bool:
-        return bool(line.get("dense")) and not self.folder.dense_map(line["source"], line["target"]).is_file()
+        return bool(line.get("written")) and not self.folder.dense_map(line["source"], line["target"]).is_file()
 
     def _take(self, edge: Edge, line: dict[str, Any], found: dict[Edge, Figures]) -> None:
         known = figures_of(line)

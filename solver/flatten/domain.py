@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from ..mobius import Mobius, SphereMobius
-from ..surface.mesh import Floats, Integers, Places
+from ..surface.mesh import Floats, Integers, Places, TriangleMesh
 from .distortion import signed_areas, signed_volumes
 from .locate import TriangulatedDisc, TriangulatedSphere, plane
 
@@ -35,6 +35,18 @@ class Domain(Protocol):
 
     def areas(self, places: Places, faces: Integers) -> Floats:
         """Return for each triangle, (m,), a number that is positive where it is not turned over."""
+        ...
+
+    def flat_areas(self, places: Places, faces: Integers) -> Floats:
+        """Return the areas of flat triangles, (m,); in the disc negative where they are turned over."""
+        ...
+
+    def reflected(self, places: Places) -> Places:
+        """Return places as a reflected transformation sees them."""
+        ...
+
+    def moved(self, places: Places, motion: Places) -> Places:
+        """Return where places, (n,), come by a motion, (n,), along the domain, which they do not leave."""
         ...
 
     def triangulated(self, places: Places, faces: Integers) -> TriangulatedDisc:
@@ -82,6 +94,19 @@ class Disc:
     def areas(self, places: Places, faces: Integers) -> Floats:
         """Return signed areas."""
         return signed_areas(places, faces)
+
+    def flat_areas(self, places: Places, faces: Integers) -> Floats:
+        """Return signed areas."""
+        return signed_areas(places, faces)
+
+    def reflected(self, places: Places) -> Places:
+        """Return the conjugates."""
+        return np.conj(places)
+
+    def moved(self, places: Places, motion: Places) -> Places:
+        """Return places after a motion; beyond the circle they stay on it."""
+        there = places + motion
+        return there / np.maximum(np.abs(there), 1.0)
 
     def triangulated(self, places: Places, faces: Integers) -> TriangulatedDisc:
         """Prepare a triangulation for point location."""
@@ -138,6 +163,19 @@ class Sphere:
     def areas(self, places: Places, faces: Integers) -> Floats:
         """Return det(a, b, c) of the corners."""
         return signed_volumes(places, faces)
+
+    def flat_areas(self, places: Places, faces: Integers) -> Floats:
+        """Return the areas of the triangles that the geodesics' corners span."""
+        return TriangleMesh(np.nan_to_num(places), faces).face_areas
+
+    def reflected(self, places: Places) -> Places:
+        """Return places with the sign of y changed."""
+        return places * [1.0, -1.0, 1.0]
+
+    def moved(self, places: Places, motion: Places) -> Places:
+        """Return places after a motion, drawn back to the sphere."""
+        there = places + motion
+        return there / np.linalg.norm(there, axis=1, keepdims=True)
 
     def triangulated(self, places: Places, faces: Integers) -> TriangulatedDisc:
         """Prepare a triangulation for point location."""

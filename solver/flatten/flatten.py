@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..mobius import Mobius
 from ..surface.holes import filled
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
+from ..surface.kept import kept
 from ..surface.laplacian import mollified_lengths
 from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.topology import Topology, require_disc
@@ -72,12 +72,12 @@ class Flattening:
         """All boundary loops, the outer one first."""
         return (self.boundary, *self.holes)
 
-    @cached_property
+    @kept
     def triangles(self) -> TriangulatedDisc:
         """The triangles in the disc, prepared for point location."""
         return self.domain.triangulated(self.places, self.mesh.faces)
 
-    @cached_property
+    @kept
     def distortion(self) -> Distortion:
         """How far the map is from conformal."""
         return distortion(self.mesh, self.disc, self.boundary)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..surface.mesh import Booleans, Complexes, Floats, Integers, Places, face_neighbours
+from ..surface.nearest import first_corners
 
 AT_ONCE = 4096
 """Queries outside whose nearest face is looked for at a time: some 100 MB of candidates."""
@@ -36,7 +37,7 @@ class TriangulatedDisc:
     @staticmethod
     def of(points: Places, faces: Integers) -> TriangulatedDisc:
         """Prepare the triangulation with these points, (n,), and faces, (m, 3)."""
-        used, first = np.unique(faces.ravel(), return_index=True)
+        used, first = first_corners(faces, len(points))
         tree = KDTree(plane(points[used]))
         return TriangulatedDisc(points, faces, face_neighbours(faces, len(points)), tree, first // 3)
 
@@ -148,7 +149,7 @@ class TriangulatedSphere(TriangulatedDisc):
     @staticmethod
     def of(points: Places, faces: Integers) -> TriangulatedSphere:
         """Prepare the triangulation with these points, (n, 3), and faces, (m, 3), counter-clockwise from outside."""
-        used, first = np.unique(faces.ravel(), return_index=True)
+        used, first = first_corners(faces, len(points))
         return TriangulatedSphere(points, faces, face_neighbours(faces, len(points)), KDTree(points[used]), first // 3)
 
     def _coordinates(self, points: Places) -> Floats:

@@ -11,14 +11,14 @@ way, by the plane too.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ..surface.intrinsic_delaunay import IntrinsicTriangulation
+from ..surface.kept import kept
 from ..surface.laplacian import cotangents, mollified_lengths
-from ..surface.mesh import Complexes, Floats, Integers, MeshError, Places, TriangleMesh, edges_of_sides, twin_sides
+from ..surface.mesh import Complexes, Floats, Integers, Places, TriangleMesh, edges_of_sides, twin_sides
 from ..surface.sampling import edge_graph
 from ..surface.statistics import weighted_median
 from ..surface.topology import require_sphere
@@ -65,7 +65,7 @@ class SphereFlattening:
         """Where the places are."""
         return SPHERE
 
-    @cached_property
+    @kept
     def triangles(self) -> TriangulatedDisc:
         """The triangles in the sphere, prepared for point location."""
         return self.domain.triangulated(self.places, self.mesh.faces)
@@ -90,20 +90,13 @@ class SphereFlattening:
         """None."""
         return 0.0
 
-    @cached_property
+    @kept
     def distortion(self) -> Distortion:
         """How far the map is from conformal."""
         return spherical_distortion(self.mesh, self.sphere)
 
 
 Flat = Flattening | SphereFlattening
-
-
-def require_open(flat: Flat) -> Flattening:
-    """Return a flattening that is a disc; raises `MeshError` of a sphere, where only discs go on."""
-    if isinstance(flat, Flattening):
-        return flat
-    raise MeshError(f"'{flat.mesh.name}' is closed, and collections take open surfaces only: cut all open alike")
 
 
 def flatten_sphere(mesh: TriangleMesh) -> SphereFlattening:

@@ -82,12 +82,12 @@ def nested_dissection_cholesky(matrix: csc_array) -> Callable[[Floats], Floats]:
     row, column = place[entries.row], place[entries.col]
     lower = row >= column
     permuted = csc_array((entries.data[lower], (row[lower], column[lower])), shape=(n, n))
-    with _one_thread():
+    with one_thread():
         fronts = _eliminated(permuted, part[order[bounds]], np.append(bounds, n))
 
     def solve(right: Floats) -> Floats:
         x = right[order].reshape(n, -1)
-        with _one_thread():
+        with one_thread():
             for front in fronts:
                 x[front.start : front.stop] = y = front.inverse @ x[front.start : front.stop]
                 x[front.rows] -= front.below @ y
@@ -174,7 +174,7 @@ def _hops(graph: csr_array, start: int) -> Floats:
     return hops
 
 
-def _one_thread() -> AbstractContextManager[object]:
+def one_thread() -> AbstractContextManager[object]:
     """Keep BLAS to one thread: on thousands of small blocks more of them mostly wait for each other."""
     return nullcontext() if threadpoolctl is None else threadpoolctl.threadpool_limits(1, "blas")
 

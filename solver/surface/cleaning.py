@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
 from .gluing import Glue, glue_of, shape_of, sides_to_turn, turned_glue, vertices_of_glue
 from .handles import MOST, cut_handles
 from .joining import coinciding
+from .kept import kept
 from .mesh import Booleans, Floats, Integers, MeshError, TriangleMesh, edges_of_sides, plural, twin_sides
 from .numbers import computable
 from .sheets import drawn_together, inner_walls
@@ -150,7 +150,7 @@ class _Work:
     def areas(self) -> Floats:
         return self.calm.face_areas[self.kept]
 
-    @cached_property
+    @kept
     def calm(self) -> TriangleMesh:
         """The mesh without spikes, the faces of which would outweigh all others."""
         return without_spikes(self.mesh)[0]

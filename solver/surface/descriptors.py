@@ -8,14 +8,17 @@ hills from dents.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
 from .cholesky import factorised
 from .intrinsic_delaunay import IntrinsicTriangulation, intrinsic_delaunay, non_negative_laplacian
 from .laplacian import mollified_lengths
 from .mesh import Floats, TriangleMesh
+from .two_grids import TwoGrids
 
 DIFFUSION_TIMES = (0.0005, 0.002, 0.008, 0.03)
 """Diffusion times as fractions of the surface's area: from a fiftieth to a sixth of its width in standard deviation."""
@@ -23,6 +26,14 @@ DIFFUSION_TIMES = (0.0005, 0.002, 0.008, 0.03)
 
 LEAST_SHARE = 1e-6
 """Share of what is diffused, against the largest, below which a place is too far from all vertices inside."""
+
+LARGE = 30_000
+"""Vertices from which on two grids take less time than factorisations."""
+
+ENOUGH = 1e-3
+"""Estimated error at which a step on two grids ends, relative to how far the diffusion moves the surface, or to what is
+diffused on it. On faces of 97,000 and 340,000 triangles the descriptors then differ by 0.1 to 0.4 % of their spread
+from those of a factorisation, by 1 to 11 % between one triangulation of a face and another."""
 
 
 def diffused_curvatures(
@@ -43,20 +54,25 @@ def diffused_curvatures(
     sides = mollified_lengths(mesh.edge_lengths)
     surface = intrinsic_delaunay(IntrinsicTriangulation(mesh.faces, sides, mesh.twins, len(mesh.vertices)))
     stiffness, masses = non_negative_laplacian(surface), surface.vertex_areas
-    used = np.unique(mesh.faces)
+    used = np.flatnonzero(mesh.used)
     inner = csc_array(stiffness[used][:, used])
     weights = csc_array(diags_array(masses[used]))
     missing, inside = _missing_angles(mesh)
     right = np.column_stack([weights @ mesh.vertices[used], missing[used], (masses * inside)[used]])
+    grids = TwoGrids(csr_array(inner), masses[used]) if len(used) >= LARGE else None
     result = np.zeros((len(mesh.vertices), 2 * len(times)))
     for k, t in enumerate(times):
-        if progress:
-            progress(k / len(times))
-        solved = factorised(csc_array(weights + (t * area) * inner))(right)
+        tell = partial(progress, k / len(times)) if progress else _nobody
+        tell()
+        if grids:
+            solved = grids.solved(t * area, right, _Enough(mesh.vertices[used], masses[used], tell))
+            vector = (right[:, :3] - weights @ solved[:, :3]) / (t * area)  # the same, but errors stay small
+        else:
+            solved = factorised(csc_array(weights + (t * area) * inner))(right)
+            vector = inner @ solved[:, :3]
         diffused = mesh.vertices.copy()
         diffused[used] = solved[:, :3]
         normals = TriangleMesh(diffused, mesh.faces).vertex_normals()[used]
-        vector = inner @ solved[:, :3]
         result[used, k] = (vector * normals).sum(axis=1) / (2 * masses[used]) * np.sqrt(area)
         # the second is the share of what was diffused here that comes from inside: no angle is missing at the boundary,
         # and where hardly anything comes from inside nothing is known of it
@@ -64,6 +80,30 @@ def diffused_curvatures(
         gauss = solved[:, 3] * area / np.maximum(share, np.finfo(float).tiny)
         result[used, len(times) + k] = np.sign(gauss) * np.sqrt(np.abs(gauss))
     return result
+
+
+@dataclass(frozen=True)
+class _Enough:
+    """Whether what is diffused is known well enough: places, whose moves are curvature, and the last two columns."""
+
+    places: Floats
+    masses: Floats
+    tell: Callable[[], None]
+
+    def __call__(self, solved: Floats, error: Floats) -> bool:
+        self.tell()
+        of_moves = self._square(solved[:, :3] - self.places).sum()
+        whole = np.append(np.full(3, of_moves / 3), self._square(solved[:, 3:]))
+        off = self._square(error)
+        off[:3] = off[:3].sum() / 3
+        return bool((off <= ENOUGH**2 * whole).all())
+
+    def _square(self, values: Floats) -> Floats:
+        return np.einsum("i,ij,ij->j", self.masses, values, values)
+
+
+def _nobody() -> None:
+    """Tell nobody."""
 
 
 def _missing_angles(mesh: TriangleMesh) -> tuple[Floats, Floats]:

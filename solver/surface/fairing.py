@@ -13,7 +13,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
 from .cholesky import factorised
 from .descriptors import DIFFUSION_TIMES
-from .mesh import Floats, Integers, TriangleMesh, face_neighbours
+from .mesh import Floats, Integers, TriangleMesh
 
 ROUGH = 0.01
 """Roughness up to which a mesh is left alone: the normals of neighbours scatter by a tenth of a radian. Nineteen clean
@@ -39,7 +39,7 @@ def roughness(mesh: TriangleMesh) -> float:
     """
     areas = mesh.face_areas
     normals = mesh.face_vectors / np.maximum(2 * areas[:, None], np.finfo(float).tiny)
-    beside = face_neighbours(mesh.faces, len(mesh.vertices))
+    beside = mesh.neighbours
     face, side = np.nonzero(beside >= 0)
     next_to = beside[face, side]
     if not len(face):
@@ -95,4 +95,4 @@ def _smoothed(mesh: TriangleMesh, strength: float) -> TriangleMesh:
     system = csc_array(diags_array((1 + strength) * degree[inside]) - strength * rows[:, inside])
     vertices = mesh.vertices.copy()
     vertices[inside] = factorised(system)(right)
-    return TriangleMesh(vertices, mesh.faces, mesh.name)
+    return mesh.moved(vertices)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from .kept import kept
 
 Floats = npt.NDArray[np.float64]
 
@@ -78,7 +79,19 @@ class TriangleMesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", np.ascontiguousarray(faces, dtype=np.intp))
 
-    @cached_property
+    def moved(self, vertices: Floats) -> TriangleMesh:
+        """Return the mesh with its vertices, (n, 3), elsewhere; what is known of its edges stays known."""
+        result = TriangleMesh(vertices, self.faces, self.name)
+        known = ("_edges_of_sides", "twins", "used")
+        result.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
+        return result
+
+    @property
+    def neighbours(self) -> Integers:
+        """The face across the side opposite each corner, (m, 3); -1 where there is none, or several."""
+        return np.where(self.twins < 0, -1, self.twins // 3).reshape(-1, 3)
+
+    @kept
     def fingerprint(self) -> str:
         """32 hexadecimal digits of the positions and faces, in their order; the same on every platform.
 
@@ -93,37 +106,37 @@ class TriangleMesh:
         digest.update(self.faces.astype("<i8", copy=False).tobytes())
         return digest.hexdigest()
 
-    @cached_property
+    @kept
     def face_vectors(self) -> Floats:
         """Cross product of two sides per face, (m, 3): the face normal times twice the area."""
         a = self.vertices[self.faces[:, 0]]
         (ux, uy, uz), (vx, vy, vz) = ((self.vertices[self.faces[:, k]] - a).T for k in (1, 2))
         return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
 
-    @cached_property
+    @kept
     def face_areas(self) -> Floats:
         """Area of each face, (m,), in squared length units."""
         return 0.5 * np.sqrt((self.face_vectors**2).sum(axis=1))
 
-    @cached_property
+    @kept
     def area(self) -> float:
         """Area of the surface, in squared length units."""
         return float(self.face_areas.sum())
 
-    @cached_property
+    @kept
     def vertex_areas(self) -> Floats:
         """Barycentric dual area of each vertex, (n,): a third of the faces around it."""
         third = np.repeat(self.face_areas / 3, 3)
         return np.bincount(self.faces.ravel(), third, len(self.vertices)).astype(np.float64, copy=False)
 
-    @cached_property
+    @kept
     def used(self) -> Booleans:
         """Whether each vertex is in a face, (n,)."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces] = True
         return used
 
-    @cached_property
+    @kept
     def edge_lengths(self) -> Floats:
         """Length of the side opposite each corner, (m, 3), in length units."""
         low, high = self.edges.T
@@ -141,11 +154,11 @@ class TriangleMesh:
         """Row in `edges` of each side, (3 m,); side 3 f + k is opposite corner k of face f."""
         return self._edges_of_sides[1]
 
-    @cached_property
+    @kept
     def _edges_of_sides(self) -> tuple[Integers, Integers]:
         return edges_of_sides(self.faces, len(self.vertices))
 
-    @cached_property
+    @kept
     def twins(self) -> Integers:
         """The other side of each side's edge, (3 m,); -1 where the edge has one side, or more than two."""
         return twin_sides(self.edge_of_side)
@@ -179,8 +192,15 @@ def directed_edges(faces: Integers) -> Integers:
 
 def edges_of_sides(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
     """Return undirected edges, (e, 2), each once, sorted, and the edge of each side in `directed_edges`, (3 m,)."""
-    edges, edge_of_side = np.unique(_edge_keys(faces, vertex_count), return_inverse=True)
-    return np.stack(np.divmod(edges, vertex_count), axis=1), edge_of_side.reshape(-1)
+    keys = _edge_keys(faces, vertex_count)
+    # as np.unique does, but for the stable order, which takes half the time on numbers that lie nearly in order
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    first = np.ones(len(keys), bool)
+    first[1:] = keys[1:] != keys[:-1]
+    edge_of_side = np.empty(len(keys), np.intp)
+    edge_of_side[order] = np.cumsum(first) - 1
+    return np.stack(np.divmod(keys[first], vertex_count), axis=1), edge_of_side
 
 
 def _edge_keys(faces: Integers, vertex_count: int) -> Integers:

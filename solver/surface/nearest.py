@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from .mesh import Booleans, Floats, Integers, TriangleMesh, face_neighbours
+from .kept import kept
+from .mesh import Booleans, Floats, Integers, TriangleMesh
 
 SUITABLE = 2
 """Samples around whose faces `SurfacePoints.most_alike` looks."""
 
 AT_ONCE = 4096
 """Queries that are answered together: enough for numpy, few enough to stay in the processor's cache."""
+
+BESIDE_RIM = 6
+"""Faces, one behind the other, between a boundary and a sample from which on nothing nearest is on the boundary: the
+six samples that suit a query best lie within three of each other."""
+
+MANY, MOST_WORKERS = 6, 4
+"""Such lots from which on several processors answer them, and how many at most: what numpy does between its loops, no
+two threads do at the same time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +45,21 @@ class SurfacePoints:
     loops: tuple[Integers, ...]
     normal_weight: float
 
-    @cached_property
-    def _normals(self) -> Floats:
+    @kept
+    def normals(self) -> Floats:
+        """Unit normal of each vertex, (n, 3)."""
         return self.mesh.vertex_normals()
 
-    @cached_property
+    @kept
     def _features(self) -> Floats:
         """Position and weighted normal of each vertex, (n, 6)."""
-        return np.hstack([self.mesh.vertices, self.normal_weight * self._normals])
+        return np.hstack([self.mesh.vertices, self.normal_weight * self.normals])
 
-    @cached_property
+    @kept
     def _tree(self) -> tuple[KDTree, Integers]:
         """The vertices in use and the faces' centres, with positions and weighted unit normals; a face of each."""
         features = self._features
-        used, first = np.unique(self.mesh.faces.ravel(), return_index=True)
+        used, first = first_corners(self.mesh.faces, len(features))
         centres = features[self.mesh.faces].mean(axis=1)
         length = np.linalg.norm(centres[:, 3:], axis=1, keepdims=True)
         centres[:, 3:] *= self.normal_weight / np.maximum(length, np.finfo(float).tiny)
@@ -56,18 +67,18 @@ class SurfacePoints:
             [first // 3, np.arange(len(self.mesh.faces))]
         )
 
-    @cached_property
+    @kept
     def _neighbours(self) -> Integers:
-        return face_neighbours(self.mesh.faces, len(self.mesh.vertices))
+        return self.mesh.neighbours
 
-    @cached_property
+    @kept
     def _on_rim(self) -> Booleans:
         rim = np.zeros(len(self.mesh.vertices), bool)
         for loop in self.loops:
             rim[loop] = True
         return rim
 
-    @cached_property
+    @kept
     def _rim(self) -> tuple[KDTree, Floats, Floats]:
         """Points along the boundaries' edges, four to each, and the unit vectors along them."""
         start = self.mesh.vertices[np.concatenate(self.loops)]
@@ -98,6 +109,21 @@ class SurfacePoints:
         faces = np.concatenate([near, self._around(near[:, :2])], axis=1)
         return self._nearest_among(faces, points, self.mesh.vertices, progress)
 
+    def may_be_beyond(self, points: Floats, normals: Floats) -> Booleans:
+        """Return which queries, (q,), may have their nearest point on a boundary; the sample that suits best tells.
+
+        It takes a third of the time of `nearest_point`, whose samples lie next to that one, within `BESIDE_RIM`.
+        """
+        return self._beside_rim[self._near(points, normals, 1)[:, 0]]
+
+    @kept
+    def _beside_rim(self) -> Booleans:
+        """Which faces, (m,), are within `BESIDE_RIM` of a boundary."""
+        reached, faces = self._on_rim.copy(), self.mesh.faces
+        for _ in range(BESIDE_RIM):
+            reached[faces[reached[faces].any(axis=1)]] = True
+        return reached[faces].any(axis=1)
+
     def most_alike(self, points: Floats, normals: Floats) -> tuple[Integers, Floats]:
         """Return the face, (q,), and barycentric coordinates, (q, 3), of the point that suits each query best.
 
@@ -114,7 +140,7 @@ class SurfacePoints:
         corners = self.mesh.faces[face]
         beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
         position, normal = (
-            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self._normals)
+            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self.normals)
         )
         return position, _unit(normal), beyond
 
@@ -138,9 +164,8 @@ class SurfacePoints:
         """Return which of the faces, (q, k), is nearest to each point, (q, d), and where, with vertices at `places`."""
         count = faces.shape[1]
         face, barycentric = np.empty(len(points), faces.dtype), np.empty((len(points), 3))
-        for start in range(0, len(points), AT_ONCE):
-            if progress:
-                progress(start / len(points))
+
+        def answer(start: int) -> None:
             rows = slice(start, start + AT_ONCE)
             tried, query = faces[rows], np.repeat(points[rows], count, axis=0)
             corners = places[self.mesh.faces[tried.ravel()]]
@@ -149,7 +174,45 @@ class SurfacePoints:
             best = _dot(apart, apart).reshape(-1, count).argmin(axis=1)
             each = np.arange(len(tried))
             face[rows], barycentric[rows] = tried[each, best], weights.reshape(-1, count, 3)[each, best]
+
+        in_turn(answer, range(0, len(points), AT_ONCE), progress)
         return face, barycentric
+
+
+def in_turn(work: Callable[[int], None], each: Sequence[int], progress: Callable[[float], None] | None) -> None:
+    """Do the work for each number, where there are many on all processors; they must not depend on each other.
+
+    `progress` is called in this thread, with the share of them that is done; once it raises no other is begun.
+    """
+    tell = progress or (lambda _: None)
+    workers = min(os.cpu_count() or 1, MOST_WORKERS) if len(each) >= MANY else 1
+    if workers == 1:
+        for k, number in enumerate(each):
+            tell(k / len(each))
+            work(number)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        begun = [pool.submit(work, number) for number in each]
+        try:
+            for k, one in enumerate(begun):
+                tell(k / len(each))
+                one.result()
+        finally:
+            for one in begun:
+                one.cancel()
+
+
+def first_corners(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
+    """Return the vertices in use, (k,), and for each the first corner of the faces, (m, 3), that it is.
+
+    >>> first_corners(np.array([[3, 1, 0], [1, 3, 4]]), 5)
+    (array([0, 1, 3, 4]), array([2, 1, 0, 5]))
+    """
+    first = np.full(vertex_count, -1)
+    corners = faces.ravel()[::-1]
+    first[corners] = np.arange(len(corners) - 1, -1, -1)  # of several writes the last one stays
+    used = np.flatnonzero(first >= 0)
+    return used, first[used]
 
 
 def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:

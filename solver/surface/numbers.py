@@ -52,7 +52,7 @@ def computable(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     corner = result.vertices[result.used]
     middle, diagonal = (corner.min(axis=0) + corner.max(axis=0)) / 2, result.diagonal
     if float(np.abs(middle).max()) > FAR * diagonal:
-        result = TriangleMesh(result.vertices - middle, result.faces, mesh.name)
+        result = result.moved(result.vertices - middle)
         notes.append("far from the origin, moved there")
     low, high = result.edges.T
     length = np.sqrt(((result.vertices[low] - result.vertices[high]) ** 2).sum(axis=1))
@@ -79,7 +79,7 @@ def _scaled(mesh: TriangleMesh, size: float) -> tuple[TriangleMesh, int]:
     exponent = -int(np.frexp(size)[1])
     with np.errstate(over="ignore"):  # vertices in no face may lie anywhere
         vertices = np.where(mesh.used[:, None], np.ldexp(mesh.vertices, exponent), 0.0)
-    return TriangleMesh(vertices, mesh.faces, mesh.name), exponent
+    return mesh.moved(vertices), exponent
 
 
 def _step(mesh: TriangleMesh) -> float:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from .gluing import Glue, glue_of, sides_to_turn, vertices_of_glue
 from .joining import coinciding
+from .kept import kept
 from .mesh import Booleans, Floats, Integers, TriangleMesh, twin_sides
 from .numbers import computable
 from .tidy import Cleaned
@@ -138,7 +138,7 @@ class Parts:
             mesh.vertices[origin],
         )
 
-    @cached_property
+    @kept
     def _sorted(self) -> tuple[Integers, Integers]:
         """The faces by parts, and where each part begins among them."""
         order = np.argsort(self.of_face, kind="stable")
@@ -161,7 +161,7 @@ class Parts:
         inside_out = closed and np.einsum("mi,mi->", mesh.face_vectors, middle[mesh.faces[:, 0]]) < 0
         return part.turned() if inside_out else part
 
-    @cached_property
+    @kept
     def moments(self) -> tuple[Floats, Floats]:
         """Centre of the surface, (p, 3), and covariance about it, (p, 3, 3), of each part, by area.
 
@@ -184,7 +184,7 @@ class Parts:
         square = np.einsum("mki,mkj->mij", corner, corner) + along[:, :, None] * along[:, None, :]
         return centre, means(square.reshape(-1, 9) / 12).reshape(-1, 3, 3)
 
-    @cached_property
+    @kept
     def shape(self) -> Integers:
         """Euler characteristic, and whether it has a boundary, of each part: (p, 2)."""
         good = np.flatnonzero(self.of_face >= 0)

@@ -16,6 +16,9 @@ HORIZON = 0.9967  # tanh(3.2)
 cells as small as the points' distance from it. Round surfaces lose what is 1/300 of the disc's radius from the rim; on
 a band six times as long as wide, half of whose area lies there, searches end 100 times sooner with the same result."""
 
+LARGE = 30_000
+"""Vertices from which on distances from a new point are only computed around it."""
+
 
 def edge_graph(mesh: TriangleMesh) -> csr_array:
     """Return the symmetric sparse matrix of edge lengths, (n, n)."""
@@ -69,15 +72,55 @@ def farthest_points(
         chosen = [int(np.argmax(np.where(allowed, np.where(np.isfinite(depth), depth, 0), -1)))]
     distance = dijkstra(graph, indices=chosen, min_only=True)
     reachable = allowed & np.isfinite(distance)
+    left = np.where(reachable, distance, -1)
+    near = _Surroundings(mesh.vertices, graph) if len(distance) >= LARGE else None
     while len(chosen) < count:
-        new = int(np.argmax(np.where(reachable, distance, -1)))
+        new = int(np.argmax(left))
         if not reachable[new] or distance[new] <= 0:
             break
         if progress:
             progress(len(chosen) / count)
         chosen.append(new)
-        distance = np.minimum(distance, dijkstra(graph, indices=new, limit=distance[new]))
+        if near is None:
+            distance = np.minimum(distance, dijkstra(graph, indices=new, limit=distance[new]))
+            left = np.where(reachable, distance, -1)
+        else:
+            some, apart = near.distances(new, distance)
+            distance[some] = np.minimum(distance[some], apart)
+            left[some] = np.where(reachable[some], distance[some], -1)
     return np.array(chosen, dtype=np.intp)
+
+
+class _Surroundings:
+    """Finds how far along edges vertices are from a new point: those that may be nearer to it than to all before.
+
+    A way to such a vertex leads through such alone: were one on it nearer to a point before, the last would be too.
+    """
+
+    def __init__(self, vertices: Floats, graph: csr_array) -> None:
+        self.vertices, self.graph = vertices, graph
+        self.tree = KDTree(vertices, compact_nodes=False, balanced_tree=False)
+        self.place = np.full(len(vertices), -1)
+
+    def distances(self, new: int, distance: Floats) -> tuple[Integers, Floats]:
+        """Return vertices, (k,), and how far they are from vertex `new`, (k,); `distance`, (n,): of all, so far."""
+        some = np.array(self.tree.query_ball_point(self.vertices[new], distance[new], return_sorted=False), np.intp)
+        apart = np.sqrt(((self.vertices[some] - self.vertices[new]) ** 2).sum(axis=1))
+        some = some[(1 - 1e-9) * apart < distance[some]]  # no way along edges is shorter
+        graph, place = self.graph, self.place
+        place[some] = np.arange(len(some))
+        first = graph.indptr[some]
+        times = graph.indptr[some + 1] - first
+        row = np.repeat(np.arange(len(some)), times)
+        entry = np.arange(len(row)) + np.repeat(first - np.cumsum(times) + times, times)
+        column = place[graph.indices[entry]]
+        inside = column >= 0
+        starts = np.concatenate([[0], np.cumsum(np.bincount(row[inside], minlength=len(some)))])
+        size = len(some)
+        part = csr_array((graph.data[entry[inside]], column[inside], starts), shape=(size, size))
+        result = dijkstra(part, indices=int(place[new]), limit=distance[new])
+        place[some] = -1
+        return some, result
 
 
 def spread(points: Floats, count: int) -> Integers:
@@ -108,11 +151,11 @@ def thinned(points: Floats, spacing: float) -> Integers:
     crowded = max(0, int(np.log2(max(len(points), 1)) / 2) - 4)
     for halvings in range(crowded, -1, -1):
         pairs = KDTree(points[kept]).query_pairs(spacing / 2**halvings, output_type="ndarray")
-        kept = kept[_independent(pairs, rank[kept])]
+        kept = kept[independent(pairs, rank[kept])]
     return kept
 
 
-def _independent(pairs: Integers, rank: Integers) -> Booleans:
+def independent(pairs: Integers, rank: Integers) -> Booleans:
     """Return a maximal set, (n,), that holds one of each pair, (p, 2), at most: what comes first by rank, (n,), stays.
 
     Luby, "A Simple Parallel Algorithm for the Maximal Independent Set Problem" (1986).

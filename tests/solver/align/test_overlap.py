@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 from surfaces import planar, rings
 
 from solver import AlignSettings, Progress, TriangleMesh, align, correspond, flatten, report, topology
+from solver.align import overlap
 from solver.align.overlap import depth_beyond, piece
 from solver.align.pieces import _surely_better
 from solver.align.reconsider import DOUBTFUL, FITS
@@ -79,6 +80,19 @@ def test_depth_is_measured_along_the_surface():
     points = np.array([[0, 0, 0], [0.2, 0.1, 0.3], [1.5, 0, 0], [0, -1.2, 0.4]])
     depth = depth_beyond(points, np.tile([0.0, 0, 1], (4, 1)), surface)
     assert depth == pytest.approx([0, 0, 0.5, 0.2], abs=0.01)
+
+
+def test_of_many_points_those_inside_need_not_be_asked(monkeypatch):
+    mesh = planar(rings(30))
+    surface = SurfacePoints(mesh, (flatten(mesh).boundary,), 0.03)
+    rng = np.random.default_rng(3)
+    points = np.column_stack([1.3 * rng.normal(size=(800, 2)) / 2, 0.02 * rng.normal(size=800)])
+    normals = np.tile([0.0, 0, 1], (800, 1))
+    plain = depth_beyond(points, normals, surface)
+    assert 100 < (plain > 0).sum() < 700
+    monkeypatch.setattr(overlap, "LARGE", 1)
+    assert (depth_beyond(points, normals, surface) == plain).all()
+    assert not surface.may_be_beyond(points, normals).all()
 
 
 @pytest.mark.parametrize(

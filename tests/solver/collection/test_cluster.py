@@ -50,7 +50,7 @@ def test_a_cluster_finds_what_processes_find_though_a_worker_is_killed(cluster, 
     assert killed
     assert not there.failures
     for one, other in zip(here.figures, there.figures, strict=True):
-        assert (one.value, one.z, one.theta) == (other.value, other.z, other.theta)
+        assert (one.value, one.mobius) == (other.value, other.mobius)
     # each pair once
     assert (tmp_path / "there" / "pairs.jsonl").read_bytes().count(b"\n") == 15
     np.testing.assert_allclose(here.distances(), there.distances())

@@ -63,7 +63,7 @@ def test_all_pairs_are_right_and_none_is_done_twice(family: Family, tmp_path: Pa
     assert all(known.certified for known in found.figures)
     # every third is mirrored
     for (a, b), known in zip(found.edges, found.figures, strict=True):
-        assert known.reflected == ((a % 3 == 2) != (b % 3 == 2))
+        assert known.mobius.reflected == ((a % 3 == 2) != (b % 3 == 2))
     assert not found.suspects.any()
     assert len(found.cycles[0]) == 10
     distances = found.distances()
@@ -197,7 +197,7 @@ def test_processes_find_the_same_as_threads(family: Family, tmp_path: Path) -> N
     here, _ = counted(family(3), tmp_path / "a", settings=ROUGH)
     there = collect(family(3), tmp_path / "b", processes(2), settings=ROUGH, at_a_time=2)
     for one, other in zip(here.figures, there.figures, strict=True):
-        assert (one.value, one.z, one.theta, one.distance) == (other.value, other.z, other.theta, other.distance)
+        assert (one.value, one.mobius, one.distance) == (other.value, other.mobius, other.distance)
 
 
 def test_a_function_is_found_by_its_folder() -> None:
@@ -218,8 +218,8 @@ def test_the_task_that_ends_its_process_is_found_and_the_others_are_done(tmp_pat
 
 
 def _deadly(tmp_path: Path) -> list:
-    fatal = Fatal("x", "y", {})
-    return [(k, fatal if k == 3 else Compare(str(tmp_path / "none"), "", {})) for k in range(8)]
+    fatal = Fatal("x", "y", {}, "")
+    return [(k, fatal if k == 3 else Compare(str(tmp_path / "none"), "", {}, "")) for k in range(8)]
 
 
 class Fatal(Compare):
@@ -308,7 +308,7 @@ def test_no_more_tasks_wait_than_are_needed() -> None:
     def tasks():
         for k in range(200):
             begun.append(k)
-            yield k, Compare("none", "none", {})
+            yield k, Compare("none", "none", {}, "")
 
     ahead = []
     for number, _ in enumerate(completed(tasks(), lambda: ThreadPoolExecutor(2), 2)):

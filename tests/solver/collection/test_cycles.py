@@ -1,5 +1,6 @@
 """Three-cycles, on maps that are known: which are wrong is found, and paths go round them."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ from scans import bumps, posed
 
 from solver import Mobius, TriangleMesh, flatten
 from solver.align.prepared import Surface
-from solver.collection.chart import Chart, DiscMap, carried_along, mirrored
+from solver.collection.chart import Chart, ChartMap, carried_along, mirrored
 from solver.collection.cycles import (
     SUSPECT,
     closing_error,
@@ -21,6 +22,7 @@ from solver.collection.cycles import (
     triangles,
 )
 from solver.collection.routes import medoid, star_routes, tree_routes
+from solver.flatten.domain import DISC
 from solver.surface.tidy import Cleaned
 
 
@@ -30,7 +32,7 @@ def chart() -> Chart:
     flat = flatten(mesh)
     samples = np.flatnonzero(np.abs(flat.disc) < 0.9)[::7]
     tidy = Cleaned.unchanged(mesh)
-    return Chart(mesh.vertices, flat.disc, mesh.faces, mesh.vertex_areas, samples, mesh.diagonal, tidy)
+    return Chart(DISC, mesh.vertices, flat.disc, mesh.faces, mesh.vertex_areas, samples, mesh.diagonal, tidy)
 
 
 def known_maps(chart: Chart, count: int, wrong: set[tuple[int, int]], noise: float, seed: int):
@@ -41,7 +43,16 @@ def known_maps(chart: Chart, count: int, wrong: set[tuple[int, int]], noise: flo
         for _ in range(count)
     ]
     charts = [
-        Chart(chart.vertices, g(chart.disc), chart.faces, chart.areas, chart.samples, chart.diagonal, chart.cleaned)
+        Chart(
+            DISC,
+            chart.vertices,
+            g(chart.places),
+            chart.faces,
+            chart.areas,
+            chart.samples,
+            chart.diagonal,
+            chart.cleaned,
+        )
         for g in gauges
     ]
     maps = {}
@@ -50,7 +61,7 @@ def known_maps(chart: Chart, count: int, wrong: set[tuple[int, int]], noise: flo
             error = Mobius(noise * (rng.normal() + 1j * rng.normal()), noise * rng.normal())
             if (a, b) in wrong:
                 error = Mobius(0.3 * np.exp(2j * np.pi * rng.random()), rng.uniform(1.5, 4.5), bool(rng.random() < 0.4))
-            maps[a, b] = DiscMap(charts[a], charts[b], gauges[b] @ error @ gauges[a].inverse())
+            maps[a, b] = ChartMap(charts[a], charts[b], gauges[b] @ error @ gauges[a].inverse())
     return maps
 
 
@@ -85,9 +96,9 @@ def _all_wrong(specimen: int, every: list, wrong: set) -> bool:
 def test_a_path_carries_points_where_the_truth_is(chart: Chart) -> None:
     maps = known_maps(chart, 5, set(), 0.0, 3)
     path = [step(maps, a, b) for a, b in ((0, 3), (3, 1), (1, 4), (4, 2))]
-    start = maps[0, 1].source.disc[chart.samples]
+    start = maps[0, 1].source.places[chart.samples]
     end = maps[1, 2].target
-    np.testing.assert_allclose(end.places(carried_along(start, path)), chart.vertices[chart.samples], atol=1e-9)
+    np.testing.assert_allclose(end.positions(carried_along(start, path)[0]), chart.vertices[chart.samples], atol=1e-9)
     assert not mirrored(path)
     assert closing_error(maps, (0, 1, 2)) < 1e-9
 
@@ -95,26 +106,22 @@ def test_a_path_carries_points_where_the_truth_is(chart: Chart) -> None:
 @pytest.mark.parametrize("reflected", [False, True])
 def test_a_dense_map_goes_both_ways(chart: Chart, reflected: bool) -> None:
     mobius = Mobius(0.2 + 0.1j, 1.0, reflected)
-    target = Chart(
-        chart.vertices, mobius(chart.disc), chart.faces, chart.areas, chart.samples, chart.diagonal, chart.cleaned
-    )
+    target = replace(chart, places=mobius(chart.places))
     if reflected:
-        target = Chart(
-            chart.vertices, mobius(chart.disc), chart.faces[:, ::-1], chart.areas, chart.samples, chart.diagonal,
-            chart.cleaned,
-        )  # fmt: skip
-    dense = DiscMap(chart, target, mobius, carried=chart.disc)
-    points = chart.disc[chart.samples]
-    there = dense.forward(points)
+        target = replace(target, faces=chart.faces[:, ::-1])
+    dense = ChartMap(chart, target, mobius, carried=chart.places)
+    points = chart.places[chart.samples]
+    there, known = dense.forward(points)
+    assert known.all()
     np.testing.assert_allclose(there, mobius(points), atol=1e-9)
-    np.testing.assert_allclose(dense.backward(there), points, atol=1e-9)
+    np.testing.assert_allclose(dense.backward(there)[0], points, atol=1e-9)
 
 
 def test_a_cycle_that_mirrors_cannot_close(chart: Chart) -> None:
     maps = known_maps(chart, 3, set(), 0.0, 1)
     right = maps[0, 1]
     turned = right.mobius @ Mobius(0, 0, True)
-    assert closing_error({**maps, (0, 1): DiscMap(right.source, right.target, turned)}, (0, 1, 2)) == 1.0
+    assert closing_error({**maps, (0, 1): ChartMap(right.source, right.target, turned)}, (0, 1, 2)) == 1.0
 
 
 def test_a_sample_of_triangles_has_some_of_every_pair() -> None:
@@ -152,4 +159,4 @@ def test_a_chart_is_of_the_mesh_as_it_is() -> None:
     mesh = posed(bumps(900, seed=2), 1)
     extra = TriangleMesh(np.concatenate([mesh.vertices, [[0, 0, 0]]]), mesh.faces)  # in no face
     chart = Chart.of(Surface(extra, fill_holes=True, largest_part=True), 30)
-    np.testing.assert_allclose(chart.places(chart.disc[chart.samples]), chart.vertices[chart.samples], atol=1e-9)
+    np.testing.assert_allclose(chart.positions(chart.places[chart.samples]), chart.vertices[chart.samples], atol=1e-9)

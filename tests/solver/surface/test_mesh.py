@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+from scans import bumps
 from surfaces import spherical_cap
 
 from solver import MeshError, TriangleMesh
+from solver.surface.mesh import directed_edges, edges_of_sides, face_neighbours
 
 TRIANGLE = ([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
 
@@ -65,3 +67,22 @@ def test_unusable_arrays_are_refused_by_name(vertices, faces, reason):
     with pytest.raises(MeshError, match=reason) as refusal:
         TriangleMesh(vertices, faces, "Scan.003")
     assert str(refusal.value).startswith("'Scan.003' ")
+
+
+def test_a_moved_mesh_keeps_what_is_known_of_its_edges():
+    mesh = bumps(200, seed=1)
+    twins, edges = mesh.twins, mesh.edges
+    moved = mesh.moved(2 * mesh.vertices)
+    assert moved.twins is twins
+    assert moved.edges is edges
+    assert moved.edge_lengths == pytest.approx(2 * mesh.edge_lengths)
+    assert moved.area == pytest.approx(4 * mesh.area)
+    assert (moved.neighbours == face_neighbours(mesh.faces, len(mesh.vertices))).all()
+
+
+def test_edges_are_sorted_and_each_is_there_once():
+    faces = np.random.default_rng(0).integers(0, 30, (60, 3))
+    edges, edge_of_side = edges_of_sides(faces, 30)
+    ends = np.sort(directed_edges(faces), axis=1)
+    assert (edges[edge_of_side] == ends).all()
+    assert edges.tolist() == np.unique(ends, axis=0).tolist()

@@ -1,10 +1,13 @@
+import time
+
 import numpy as np
 import pytest
 from scans import bumps
 from scipy.spatial import KDTree
 
 from solver import TriangleMesh, flatten
-from solver.surface.nearest import SurfacePoints, nearest_in_triangle
+from solver.surface import nearest
+from solver.surface.nearest import SurfacePoints, in_turn, nearest_in_triangle
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +101,33 @@ def test_of_no_points_none_is_nearest(surface):
     face, weights = surface.nearest_point(np.empty((0, 3)), np.empty((0, 3)))
     assert face.shape == (0,)
     assert weights.shape == (0, 3)
+
+
+def test_many_queries_are_answered_alike_on_several_processors(surface, monkeypatch):
+    rng = np.random.default_rng(5)
+    points, normals = rng.normal(size=(500, 3)) / 3, rng.normal(size=(500, 3))
+    plain = surface.nearest_point(points, normals)
+    monkeypatch.setattr(nearest, "AT_ONCE", 7)
+    told: list[float] = []
+    found = surface.nearest_point(points, normals, progress=told.append)
+    assert all((one == two).all() for one, two in zip(plain, found, strict=True))
+    assert len(told) == -(-500 // 7)
+    assert told == sorted(told)
+
+
+def test_work_in_turn_ends_when_it_is_told_to():
+    done: list[int] = []
+
+    def stop(share: float) -> None:
+        if share > 0.1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        in_turn(lambda number: (time.sleep(0.002), done.append(number)), range(1000), stop)
+    assert 100 <= len(done) < 500
+
+    def wrong(number: int) -> None:
+        raise ValueError(number)
+
+    with pytest.raises(ValueError, match="0"):
+        in_turn(wrong, range(50), None)

@@ -5,6 +5,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from solver import TriangleMesh
+from solver.surface import sampling
 from solver.surface.sampling import edge_graph, extrema, farthest_points, thinned
 
 
@@ -76,3 +77,17 @@ def test_thinned_points_do_not_depend_on_pose_or_order():
     order = rng.permutation(len(points))
     kept = thinned((scale * points @ turn + shift)[order], scale * 0.1)
     assert sorted(order[kept].tolist()) == thinned(points, 0.1).tolist()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_on_large_meshes_the_same_points_are_farthest(monkeypatch: pytest.MonkeyPatch, seed: int):
+    """With two parts, of which one has no point at first, and a vertex in no face."""
+    one, other = bumps(1500, seed=seed), bumps(300, seed=seed + 10)
+    vertices = np.concatenate([one.vertices, other.vertices + 9, [[0, 0, 7]]])
+    mesh = TriangleMesh(vertices, np.concatenate([one.faces, other.faces + len(one.vertices)]))
+    allowed = np.random.default_rng(seed).random(len(vertices)) < 0.7
+    for first in (np.empty(0, np.intp), np.flatnonzero(allowed)[:3]):
+        plain = farthest_points(mesh, 200, first, allowed)
+        with monkeypatch.context() as patch:
+            patch.setattr(sampling, "LARGE", 1)
+            assert farthest_points(mesh, 200, first, allowed).tolist() == plain.tolist()
