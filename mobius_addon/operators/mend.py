@@ -15,6 +15,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...solver import MeshError, TriangleMesh, topology
 from ...solver.surface.joining import TOUCHING
+from ...solver.surface.mesh import Booleans
 from .. import viewport
 from ..mesh_data import Refusal, foreach, read_surface
 from ..translation import told
@@ -83,14 +84,16 @@ class MOBIUS_OT_mend(bpy.types.Operator):
         if reason := why_not(obj, "mesh", context.scene):
             self.report({"ERROR"}, reason)
             return {"CANCELLED"}
-        before = _counts(obj)
+        before, selected = _counts(obj), _selection(obj.data)
         try:
             _mend(context, obj, self.how)
         except (Refusal, MeshError) as error:
+            _select(obj.data, selected)
             self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
         after = _counts(obj)
         if self.how not in ("normals", "flip") and after == before:
+            _select(obj.data, selected)  # Blender takes no undo step of this
             self.report({"WARNING"}, rpt_("'{}' has nothing that this would change").format(obj.name))
             return {"CANCELLED"}
         label = rpt_(remedy(self.how).label)
@@ -101,6 +104,17 @@ class MOBIUS_OT_mend(bpy.types.Operator):
 
 def _counts(obj: bpy.types.Object) -> tuple[int, int]:
     return len(obj.data.vertices), len(obj.data.polygons)
+
+
+def _selection(mesh: bpy.types.Mesh) -> list[Booleans]:
+    """Return which vertices, edges and polygons of a mesh are selected."""
+    return [foreach(elements, "select", 1, np.bool_) for elements in (mesh.vertices, mesh.edges, mesh.polygons)]
+
+
+def _select(mesh: bpy.types.Mesh, selected: list[Booleans]) -> None:
+    """Select what `_selection` has told."""
+    for elements, chosen in zip((mesh.vertices, mesh.edges, mesh.polygons), selected, strict=True):
+        elements.foreach_set("select", chosen)
 
 
 def _mend(context: bpy.types.Context, obj: bpy.types.Object, how: str) -> None:

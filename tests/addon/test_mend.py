@@ -112,6 +112,18 @@ def test_faces_are_turned_and_inner_ones_deleted() -> None:
     assert len(cube.data.polygons) == len(faces)
 
 
+@pytest.mark.parametrize("how", ["fill", "join", "largest", "inner"])
+def test_where_nothing_is_to_be_mended_the_selection_stays(how: str) -> None:
+    obj = sheet()
+    chosen = [vertex.index % 3 == 0 for vertex in obj.data.vertices]
+    edges = [edge.index % 5 == 0 for edge in obj.data.edges]
+    obj.data.vertices.foreach_set("select", chosen)
+    obj.data.edges.foreach_set("select", edges)
+    assert mend(obj, how) == {"CANCELLED"}
+    assert [vertex.select for vertex in obj.data.vertices] == chosen
+    assert [edge.select for edge in obj.data.edges] == edges
+
+
 def test_nothing_is_done_to_what_cannot_be_edited() -> None:
     obj = sheet(lambda i, j: j != 3)
     bpy.context.scene.collection.objects.unlink(obj)
