@@ -80,6 +80,7 @@ GERMAN_SENTENCES = {
     "'{}' was edited during the transfer: transfer again": "„{}“ wurde während des Übertragens bearbeitet: Nochmals übertragen",
     "'{}' was removed or is being edited since the transfer began: transfer again": "„{}“ wurde seit Beginn des Übertragens entfernt oder wird bearbeitet: Nochmals übertragen",
     "'{}' would have {} UV maps and Blender allows {}: delete some first": "„{}“ hätte {} UV-Maps, und Blender erlaubt {}: Zuerst welche löschen",
+    "'{}' {}: a sheet with thickness, of which one side is enough: take away its Solidify modifier, or delete its inner side and its rim": "„{}“ {}: eine Haut mit Dicke, von der eine Seite genügt: Den Modifikator Verdicken entfernen oder die Innenseite und ihren Rand löschen",
     "'{}' {} (it has no boundary), and nothing hangs on it by a neck where it could be cut: delete some faces to open it into a disc": "„{}“ {} (ohne Rand), und nichts hängt an einem Hals, an dem sich schneiden ließe: Einige Flächen löschen, um es zu einer Scheibe zu öffnen",
     "'{}' {}, and of {} that hang on it by a neck none fits '{}': cut out what is to be matched, or name a vertex group of it": "„{}“ {}, und von {}, die an einem Hals daran hängen, passt keines zu „{}“: Ausschneiden, was zugeordnet werden soll, oder eine Punktgruppe davon nennen",
     "is closed": "ist geschlossen",

@@ -16,6 +16,7 @@ from ..flatten.sphere import Flat
 from ..stages import Part
 from ..surface.mesh import Floats, MeshError, TriangleMesh, plural
 from ..surface.necks import Neck, necks
+from ..surface.sheets import is_thick_sheet
 from ..surface.topology import topology
 from .dense import drafted_from
 from .mobius_map import roughly_aligned
@@ -134,6 +135,11 @@ def _piece_like(
             break
     if best is None and reason == CLOSED:
         if not pieces:
+            if is_thick_sheet(mesh):
+                raise MeshError(
+                    f"'{name}' {CLOSED}: a sheet with thickness, of which one side is enough: take away its Solidify "
+                    "modifier, or delete its inner side and its rim"
+                )
             raise MeshError(
                 f"'{name}' {CLOSED} (it has no boundary), and nothing hangs on it by a neck where it could be cut: "
                 "delete some faces to open it into a disc"

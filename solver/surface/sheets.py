@@ -1,16 +1,32 @@
-"""Faces that keep a surface from being one: inner walls, and edges without length."""
+"""What keeps a surface from being one sheet: inner walls, edges without length, a second side close below."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from .gluing import glue_of
-from .mesh import Booleans, Floats, Integers, edges_of_sides, twin_sides
+from .mesh import Booleans, Floats, Integers, TriangleMesh, edges_of_sides, twin_sides
 
 WALLS = 0.2
 """Share of the area that walls may have together: more is no wall."""
+
+THIN, OPPOSITE, MOSTLY = 0.05, -0.7, 0.85
+"""Distance in roots of the area, cosine between normals, and share of the area of a sheet with thickness: what has a
+second side so near, turned away. Faces of a thickness of 0.3 to 2 % of the diagonal have it at 0.96 of their area and
+more, hands, feet, ears and heads at 0.36 at most, cortices, in their furrows, at 0.69."""
+
+
+def is_thick_sheet(mesh: TriangleMesh) -> bool:
+    """Return whether a closed surface is a sheet with two sides and a rim, as Solidify makes of an open one."""
+    points, normals = mesh.vertices / np.sqrt(mesh.area), mesh.vertex_normals()
+    distance, other = KDTree(np.concatenate([points, THIN * normals], axis=1)).query(
+        np.concatenate([points, -THIN * normals], axis=1)
+    )
+    thin = (distance < THIN) & ((normals * normals[other]).sum(axis=1) < OPPOSITE)
+    return bool(mesh.vertex_areas[thin].sum() > MOSTLY * mesh.area)
 
 
 def inner_walls(faces: Integers, areas: Floats, vertex_count: int) -> Booleans:

@@ -21,6 +21,7 @@ from solver import (
     prepare,
     report,
     save_surface,
+    topology,
 )
 from solver.align.cutting import MUCH, like_pieces, shrunk
 from solver.align.judgement import judge
@@ -146,6 +147,20 @@ def test_what_does_not_fit_is_refused(pair: tuple[TriangleMesh, TriangleMesh, np
         align(head, ball, SMALL)
     with pytest.raises(MeshError, match="is closed"):
         align(head, body, replace(SMALL, cut=False))
+
+
+def test_a_sheet_with_thickness_is_called_so() -> None:
+    """As Solidify makes it: two sides, and faces between their rims."""
+    sheet = bumps(400, seed=3)
+    loop, count = topology(sheet).boundary_loops[0], len(sheet.vertices)
+    beside = np.roll(loop, -1)
+    inner = sheet.vertices - 0.01 * sheet.diagonal * sheet.vertex_normals()
+    rim = [np.stack([beside, loop, loop + count], axis=1), np.stack([beside, loop + count, beside + count], axis=1)]
+    faces = np.concatenate([sheet.faces, sheet.faces[:, ::-1] + count, *rim])
+    thick = TriangleMesh(np.concatenate([sheet.vertices, inner]), faces, "Thick")
+    assert not topology(thick).boundary_loops
+    with pytest.raises(MeshError, match=r"^'Thick' is closed: a sheet with thickness"):
+        align(sheet, thick, SMALL)
 
 
 def hose(rows: int, columns: int, angle: float, seed: int) -> tuple[TriangleMesh, np.ndarray, np.ndarray]:
