@@ -20,6 +20,7 @@ from ..surface.nearest import SurfacePoints
 from .agreement import descriptor_distance
 from .alignment import Alignment
 from .mobius_map import implied, improved, rival_of, taking, unproved, valued
+from .own_mirror import mirror_plane, mirrored
 
 POSE_NODES = 300
 """Vertices of the target that look for a rigid pose."""
@@ -88,21 +89,44 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
         turn = Rotation.align_vectors(x - there, all_vertices[few.nodes] - here)[0]
         poses.append((apart, reflected, turn.apply(all_vertices - here) + there, whole.faces))
     _, reflected, start, faces = min(poses, key=lambda pose: pose[:2])
+    return _in_pose(matched, onto, TriangleMesh(start, faces), reflected, "one that a rigid pose implies")
+
+
+def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
+    """Return the map that is not mirrored of what may be opposite sides of something symmetric; None if nothing is.
+
+    Where a mirrored map, drafted, puts the target, the source's own plane of symmetry mirrors it once more.
+    """
+    plane = mirror_plane(draft.onto, matched.source_descriptors) if matched.other is not None else None
+    if plane is None:
+        return None
+    target = matched.target.mesh
+    whole, _ = facing(target, False)
+    rest, there = whole.vertices / np.sqrt(whole.area), mirrored(draft.places(), *plane)
+    used = target.used
+    here, middle = rest[used].mean(axis=0), there[used].mean(axis=0)
+    turn = Rotation.align_vectors(there[used] - middle, rest[used] - here, weights=target.vertex_areas[used])[0]
+    start = TriangleMesh(turn.apply(rest - here) + middle, whole.faces)
+    return _in_pose(matched, draft.onto, start, False, "one of opposite sides of something symmetric")
+
+
+def _in_pose(matched: Alignment, onto: SurfacePoints, start: TriangleMesh, reflected: bool, what: str) -> Hypothesis:
+    """Return what the target in a pose, its faces turned to the source's side, leads to."""
+    target = matched.target
     found = matched
     if reflected != matched.mobius.reflected:
         assert matched.other is not None
         found = _other_side(matched, matched.other)
     used = np.flatnonzero(target.mesh.used)
-    face, barycentric = onto.nearest_point(start[used], TriangleMesh(start, faces).vertex_normals()[used])
+    x = start.vertices[used]
+    face, barycentric = onto.nearest_point(x, start.vertex_normals()[used])
     corners = onto.mesh.faces[face]
-    near = np.linalg.norm(np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners]) - start[used], axis=1) < FAR
+    near = np.linalg.norm(np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners]) - x, axis=1) < FAR
     there = found.source.domain.mean(found.source.places, corners, barycentric)
     weights = target.mesh.vertex_areas[used] * near * (found.source.domain.depth(there) > 1e-6)
     mobius = implied(there, target.places[used], weights, reflected)
     found = improved(replace(found, mobius=mobius), found.difference)
-    return Hypothesis(
-        replace(found, taken=valued(found.objective, found.mobius)), start, "one that a rigid pose implies"
-    )
+    return Hypothesis(replace(found, taken=valued(found.objective, found.mobius)), start.vertices, what)
 
 
 def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:

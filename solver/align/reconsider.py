@@ -20,7 +20,7 @@ from ..stages import Part
 from ..surface.mesh import Booleans, Floats
 from .alignment import Alignment
 from .dense import bent_densely, drafted_from
-from .hypotheses import Hypothesis, apart, by_pose, further, turned, unlike
+from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, turned, unlike
 from .remark import Remark
 from .side_by_side import Work, side_by_side, stages_of
 
@@ -205,8 +205,11 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         if other is None:
             return []
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
-        more = further(other, MAXIMA - 1, stages_of(note)) if matched.mobius.reflected else ()
-        return [Hypothesis(other, None, what), *more]
+        first = Hypothesis(other, None, what)
+        if not matched.mobius.reflected:
+            return [first]
+        opposite = by_own_mirror(matched, draft)
+        return [first, *further(other, MAXIMA - 1, stages_of(note)), *([] if opposite is None else [opposite])]
 
     works: list[Work[list[Hypothesis]]] = [mirrored]
     if found.mean_confidence < FITS:

@@ -58,7 +58,7 @@ class Shapes:
     @property
     def missing(self) -> Floats:
         """The share of the template's area, (k,), that each specimen lacks."""
-        return 1 - self.known @ (self.areas / self.areas.sum())
+        return ~self.known @ (self.areas / self.areas.sum())
 
     def mesh(self, number: int) -> TriangleMesh:
         """Return a specimen with the template's triangles, in its own pose, turned round where it is mirrored."""
