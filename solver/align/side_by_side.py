@@ -111,16 +111,16 @@ def measured(source: Surface, target: Surface, settings: AlignSettings, tell: Ca
     side_by_side([first, second], tell)
 
 
-def _in_order(surface: Surface, _: Callable[[float], None]) -> None:
+def _in_order(surface: Surface, _: object) -> None:
     with suppress(MeshError):
-        _ = surface.cleaned
+        surface.cleaned  # noqa: B018  (kept from here on)
 
 
-def _parts(surface: Surface, _: Callable[[float], None]) -> None:
+def _parts(surface: Surface, _: object) -> None:
     with suppress(MeshError):
-        _ = surface.parts
+        surface.parts  # noqa: B018
 
 
-def _flat(surface: Surface, _: Callable[[float], None]) -> None:
+def _flat(surface: Surface, _: object) -> None:
     with suppress(MeshError):
-        _ = surface.flattening
+        surface.flattening  # noqa: B018

@@ -101,7 +101,7 @@ def _aggregates(stiffness: csr_array) -> Integers:
     """Return the part, (n,), that each vertex belongs to: about ten neighbours around vertices three edges apart."""
     pattern = csr_array((np.ones(stiffness.nnz, np.int32), stiffness.indices, stiffness.indptr), shape=stiffness.shape)
     n = len(stiffness.indptr) - 1
-    twice = (pattern @ pattern).tocoo()
+    twice = csr_array(pattern @ pattern).tocoo()
     near = twice.row < twice.col
     pairs = np.stack([twice.row[near], twice.col[near]], axis=1)
     roots = np.flatnonzero(independent(pairs, np.random.default_rng(0).permutation(n)))
