@@ -25,7 +25,6 @@ from solver import (
 )
 from solver.align.dense import drafted_from
 from solver.align.hypotheses import by_pose
-from solver.collection.chart import Chart
 from solver.flatten.distortion import signed_volumes
 from solver.flatten.locate import TriangulatedSphere
 from solver.stages import Stages
@@ -107,11 +106,6 @@ def test_a_rigid_pose_implies_a_transformation_of_the_sphere():
     assert np.linalg.norm(there - found.target.places, axis=1).max() < 0.01
     assert found.taken is not None
     assert found.taken.value >= 0.9 * matched.value
-
-
-def test_collections_refuse_closed_surfaces_by_name():
-    with pytest.raises(MeshError, match="'egg' is closed, and collections take open surfaces only"):
-        Chart.of(prepare(ball(400, name="egg"), FEW), 20)
 
 
 def test_closed_and_open_do_not_go_together():
