@@ -7,10 +7,14 @@ import importlib
 import importlib.util
 import os
 import shutil
+import signal
 import sys
 from pathlib import Path
 
 PACKAGE = "mobius_extension"
+
+STOPPED = 130
+"""Exit status after Ctrl C, as shells have it."""
 
 
 def load_extension() -> None:
@@ -58,8 +62,13 @@ def leave(status: int) -> None:
             stream.flush()
     if "bpy" in sys.modules and (folder := sys.modules["bpy"].app.tempdir):
         shutil.rmtree(folder, ignore_errors=True)
+    if status == STOPPED and os.name == "posix":  # by the signal itself, so that a script's loop over files ends too
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGINT)
     os._exit(status)
 
 
 if __name__ == "__main__":
+    # until a command runs: inside Blender's start an exception would end in a crash, or be swallowed
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     leave(main())

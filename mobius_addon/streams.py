@@ -18,6 +18,9 @@ DONE, NOT_ALIGNED, UNUSABLE = 0, 1, 2
 """Exit statuses: done; could not do it with these meshes; wrong usage or unreadable input."""
 
 
+STOPPED = 130
+"""Exit status after Ctrl C, as shells have it."""
+
 NOT_HEARD = 141
 """Exit status where nobody reads any more, as after `| head`: that of the usual tools, which a signal ends there."""
 

@@ -88,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
     except OSError as error:
         why = f"cannot write in '{options.output}': {error.strerror or error}"
         raise Refusal(f"{why}; once that is mended, the same command goes on from here") from error
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt("the same command goes on from here") from stop
     finally:
         progress.end()
         close()

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 
 from .. import streams
-from ..streams import UNUSABLE, say_error
+from ..streams import STOPPED, UNUSABLE, say_error
 
 _DIE_WITH_PARENT = 1
 """Of prctl in <linux/prctl.h>: the signal that a process gets when its parent ends."""
@@ -38,6 +38,8 @@ def guarded(run: Callable[[], int]) -> int:
     signal.signal(signal.SIGINT, before)
     if status >= 0:
         return status
+    if status == -signal.SIGINT:
+        return STOPPED
     how = signal.strsignal(-status) or f"signal {-status}"
     if path := streams.pinned(board):
         say_error(f"mobius: '{path}' could not be read: it ends Blender ({how}), so it is damaged or too large")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 from contextlib import suppress
 
-from ..streams import NOT_ALIGNED, UNUSABLE, Unheard, say_error, take_streams
+from ..streams import NOT_ALIGNED, STOPPED, UNUSABLE, Unheard, say_error, take_streams
 from .parser import Usage, build_parser
 
 
@@ -21,8 +22,8 @@ def main(arguments: list[str], prog: str = "python .") -> int:
     Returns
     -------
     int
-        0 done; 1 could not be done with these meshes, the reason is on stderr; 2 wrong usage or unreadable input; 141
-        the reader of the output has gone.
+        0 done; 1 could not be done with these meshes, the reason is on stderr; 2 wrong usage or unreadable input; 130
+        stopped by Ctrl C; 141 the reader of the output has gone.
     """
     try:
         return _run(arguments, prog)
@@ -45,6 +46,8 @@ def _run(arguments: list[str], prog: str) -> int:
     from ..mesh_data import Refusal
 
     try:
+        if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:  # Ctrl C, from now on, takes back what was begun
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return options.run(options)
     except Unreadable as error:
         say_error(f"mobius: {error}")
@@ -52,9 +55,9 @@ def _run(arguments: list[str], prog: str) -> int:
     except (MeshError, Refusal) as error:
         say_error(f"mobius: {error}")
         return NOT_ALIGNED
-    except KeyboardInterrupt:
-        say_error("mobius: stopped, nothing was written")
-        return NOT_ALIGNED
+    except KeyboardInterrupt as stop:
+        say_error(f"mobius: stopped, {str(stop) or 'nothing was written'}")
+        return STOPPED
 
 
 def main_quietly(arguments: list[str], prog: str = "python .") -> int:

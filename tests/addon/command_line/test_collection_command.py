@@ -97,6 +97,17 @@ def test_wrong_use(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "the template 'z' is none of the specimens" in err
 
 
+def test_who_stops_it_is_told_that_it_goes_on(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mobius_extension.solver.collection.collect", stopped)
+    status, _, err = run(capsys, "collection", folder / "scans", "-o", folder / "out", "--jobs", "1")
+    assert (status, err) == (130, "mobius: stopped, the same command goes on from here\n")
+
+
 def test_the_program_spawns_processes_that_know_no_blender(folder: Path) -> None:
     (folder / "scans" / "broken.ply").unlink()
     done = program("collection", "scans", "-o", "out", "--pairs", "star", "--template", "b", *QUICK, cwd=folder)

@@ -1,5 +1,6 @@
 """The program: its help, its output and nothing beside, with and without Blender's module."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,7 @@ sys.exit(guarded(run))
          "mobius: 'a.usdc' could not be read: it ends Blender (Segmentation fault), so it is damaged or too large\n"),
         ("with streams.reading(Path('x')): pass\n    os.kill(os.getpid(), signal.SIGABRT)", 134,
          "mobius: ended: Aborted\n"),
+        ("signal.signal(signal.SIGINT, signal.SIG_DFL); os.kill(os.getpid(), signal.SIGINT)", 130, ""),
     ],
 )  # fmt: skip
 def test_a_crash_while_a_file_is_read_is_a_sentence(code: str, status: int, said: str) -> None:
@@ -88,3 +90,24 @@ def test_a_run_ends_with_the_program(tmp_path: Path) -> None:
         running.kill()
         # at the end of the last writer, not before
         assert running.stdout.read() == ""
+
+
+STOPPED = """
+import importlib, importlib.util, runpy, sys
+sys.argv = [ROOT, "check", "x.obj"]
+spec = importlib.util.spec_from_file_location("mobius_command", ROOT + "/__main__.py")
+command = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(command)
+command.load_extension()
+def run(options):
+    raise KeyboardInterrupt
+importlib.import_module(command.PACKAGE + ".mobius_addon.command_line.check").run = run
+runpy.run_path(ROOT + "/__main__.py", run_name="__main__")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a run has no process of its own")
+def test_ctrl_c_ends_the_program_by_its_signal_so_that_a_loop_over_files_ends() -> None:
+    text = STOPPED.replace("ROOT", repr(str(ROOT)))
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "mobius: stopped, nothing was written\n")
