@@ -511,7 +511,6 @@ GERMAN = {
     "about {} min left": "noch etwa {} min",
     "Looking where to cut": "Suchen, wo geschnitten wird",
     "Trying a piece": "Ein Stück versuchen",
-    "Trying the next best map": "Die nächstbeste Abbildung versuchen",
     "Trying the other end": "Das andere Ende versuchen",
     "Trying the other side": "Die andere Seite versuchen",
     "Correct by Point Pairs": "Punktpaar-Korrektur",

@@ -113,7 +113,7 @@ def evidence(
     near = np.zeros(len(used))
     if source.loops:
         rim = vertices[np.concatenate(source.loops)]
-        near = np.exp(-KDTree(rim).query(places)[0] / root / NEAR_RIM)
+        near = np.exp(-KDTree(rim).query(places, workers=-1 if len(places) > 1000 else 1)[0] / root / NEAR_RIM)
     moved, offset, unfolded = np.zeros(len(used)), np.zeros(len(used)), 0.0
     if bending is not None:
         mobius, above, unfolded = bending

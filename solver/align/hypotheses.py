@@ -59,7 +59,7 @@ def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]
     known: list[Any] = [matched.search.mobius]
     for number in range(count):
         part = clock.part(number / count, (number + 1) / count)
-        part.begin("reconsider", "Trying the next best map", 0.0)
+        part.begin("reconsider", "Trying another map", 0.0)
         rival = rival_of(matched, known, 0.0, part)
         known.append(rival.mobius)
         behind = 100 * (matched.search.value - rival.value) / len(matched.source_samples)

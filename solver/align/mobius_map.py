@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ from .prepared import Surface
 from .refine import refined
 from .remark import Remark
 from .settings import AlignSettings
-from .side_by_side import flattened, side_by_side, worth_threads
+from .side_by_side import flattened, measured
 from .sphere_map import searched_sphere, tied_orientations
 
 
@@ -58,17 +57,11 @@ def searched(
     target = target_surface.flattening
     _require_alike(source, target)
     clock.begin("descriptors", "Measuring curvature", 0.2)
-    threads = worth_threads(settings, source_surface, target_surface)
-    side_by_side([source_surface.descriptors, target_surface.descriptors], clock.within(0.2, 0.3), threads=threads)
+    measured(source_surface, target_surface, settings, clock.within(0.2, 0.3))
     source_descriptors, target_descriptors = source_surface.descriptors(), target_surface.descriptors()
     clock.begin("sampling", "Choosing points", 0.3)
-    chosen = (
-        partial(source_surface.source_points, settings.samples),
-        partial(target_surface.target_points, settings.targets),
-    )
-    side_by_side(chosen, clock.within(0.3, 0.4), threads=threads)
-    source_samples = source_surface.source_points(settings.samples)
-    target_samples = target_surface.target_points(settings.targets)
+    source_samples = source_surface.source_points(settings.samples, clock.within(0.3, 0.33))
+    target_samples = target_surface.target_points(settings.targets, clock.within(0.33, 0.4))
     problem = Objective(
         source.places[source_samples],
         target.places[target_samples],

@@ -67,10 +67,11 @@ def depth_beyond(
     faces, vertices = surface.mesh.faces, surface.mesh.vertices
     depth = np.zeros(len(points))
     asked = np.arange(len(points))
+    tell = progress or (lambda _: None)
     if len(points) >= LARGE:
-        asked = np.flatnonzero(surface.may_be_beyond(points, normals))
+        asked = np.flatnonzero(surface.may_be_beyond(points, normals, lambda share: tell(share / 2)))
         points, normals = points[asked], normals[asked]
-    face, barycentric = surface.nearest_point(points, normals, progress=progress)
+    face, barycentric = surface.nearest_point(points, normals, progress=lambda share: tell((1 + share) / 2))
     on_rim = np.zeros(len(vertices), bool)
     on_rim[np.concatenate(surface.loops)] = True
     edge = np.flatnonzero((on_rim[faces[face]] | (barycentric < 1e-9)).all(axis=1))

@@ -25,6 +25,7 @@ from .prepared import Surface
 from .reconsider import DOUBTFUL, FITS, reconsidered
 from .remark import Remark
 from .settings import AlignSettings
+from .side_by_side import told_apart
 
 
 def align(
@@ -168,6 +169,7 @@ def _with_other_parts(found: Alignment, source: Surface, target: Surface, clock:
     if found.settings.parts == "main" or not (source.largest_part and target.largest_part):
         return found
     clock.begin("parts", "Pairing parts", 0.0)
+    told_apart(source, target, found.settings, clock.within(0.0, 0.0))
     return found.annotated(whole=completed(found, source.parts, target.parts, clock.within(0.0, 1.0)))
 
 

@@ -200,24 +200,21 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
 
-    def mirrored(note: Callable[[float], None]) -> list[Hypothesis]:
-        other = turned(matched)
-        if other is None:
-            return []
+    begun: list[Hypothesis] = []
+    works: list[Work[list[Hypothesis]]] = []
+    other = turned(matched)
+    if other is not None:
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
-        first = Hypothesis(other, None, what)
-        if not matched.mobius.reflected:
-            return [first]
-        opposite = by_own_mirror(matched, draft)
-        return [first, *further(other, MAXIMA - 1, stages_of(note)), *([] if opposite is None else [opposite])]
-
-    works: list[Work[list[Hypothesis]]] = [mirrored]
+        begun.append(Hypothesis(other, None, what))
+    if other is not None and matched.mobius.reflected:
+        works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
+        works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
         works.append(lambda _: [by_pose(matched, draft.onto)])
     if found.mean_confidence <= DOUBTFUL:
         works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
-    return list(chain.from_iterable(some))
+    return [*begun, *chain.from_iterable(some)]
 
 
 def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:

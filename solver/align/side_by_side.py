@@ -87,9 +87,39 @@ def flattened(source: Surface, target: Surface, settings: AlignSettings, tell: C
         side_by_side([partial(_flat, surface) for surface in (source, target)], tell)
 
 
+def told_apart(source: Surface, target: Surface, settings: AlignSettings, tell: Callable[[float], None]) -> None:
+    """Let the parts of both meshes be told apart; what is wrong with one is said when it is used."""
+    if worth_threads(settings, source, target):
+        side_by_side([partial(_parts, surface) for surface in (source, target)], tell)
+
+
+def measured(source: Surface, target: Surface, settings: AlignSettings, tell: Callable[[float], None]) -> None:
+    """Let both surfaces be measured, and if that is done at the same time, their points be chosen."""
+    if not worth_threads(settings, source, target):
+        side_by_side([source.descriptors, target.descriptors], tell, threads=False)
+        return
+
+    def first(note: Callable[[float], None]) -> None:
+        source.descriptors(lambda share: note(0.7 * share))
+        source.source_points(settings.samples, lambda share: note(0.7 + 0.3 * share))
+
+    def second(note: Callable[[float], None]) -> None:
+        # in the other order: choosing points, which keeps other threads waiting, comes while the source is measured
+        target.target_points(settings.targets, lambda share: note(0.3 * share))
+        target.descriptors(lambda share: note(0.3 + 0.7 * share))
+
+    side_by_side([first, second], tell)
+
+
 def _in_order(surface: Surface, note: Callable[[float], None]) -> None:
     with suppress(MeshError):
         _ = surface.cleaned
+    note(1.0)
+
+
+def _parts(surface: Surface, note: Callable[[float], None]) -> None:
+    with suppress(MeshError):
+        _ = surface.parts
     note(1.0)
 
 

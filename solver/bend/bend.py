@@ -24,6 +24,7 @@ from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
 from .coarse import Coarse, coarse
 from .least_moved import unfolded
+from .noise import shortest
 from .plate import NORMAL_WEIGHT, SOLVER_STEPS, TENSION, relaxed
 from .pose import ROUGHLY_BY, in_pose, misfit, rigidly, settled
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
@@ -42,7 +43,8 @@ DRAFT_ROUNDS = 10
 """Rounds before boundaries attract each other; by then it is clear which of them correspond."""
 
 FINEST, FINE_ROUNDS = 0.01, 3
-"""The least such wavelength after the draft: two and a half distances between nodes, which carry no shorter waves."""
+"""The least such wavelength after the draft: two and a half distances between nodes, which carry no shorter waves.
+Noise makes it longer (`noise.shortest`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +253,8 @@ def finished(
     drawn = np.ones(len(target.places), bool) if alike is None else alike
     used = np.flatnonzero(target.mesh.used)
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
-    lengths = np.maximum(_lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:], FINEST)
+    finest = max(FINEST, shortest(source, target))
+    lengths = np.maximum(_lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:], finest)
     taut = partial(relaxed, tension=TENSION, steps=SOLVER_STEPS)
     now = taut(draft.rest, draft.now, flat.faces, onto, lengths, drawn[few.nodes], lambda share: tell(0.5 * share))
 
@@ -260,7 +263,7 @@ def finished(
     tell(0.5)
     followed = few.following(flat.vertices, now, unbent)[fine.nodes]
     start = few.following(flat.vertices, draft.rest, unbent)[fine.nodes]
-    lengths = np.full(FINE_ROUNDS, FINEST)
+    lengths = np.full(FINE_ROUNDS, finest)
     drawn = drawn[fine.nodes]
     now = taut(start, followed, fine.faces, onto, lengths, drawn, lambda share: tell(0.5 + 0.3 * share))
     tell(0.8)

@@ -31,6 +31,10 @@ STEPS = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Strengths of the implicit step that are tried in turn, in units of the umbrella operator."""
 
 
+MEDIAN_DEVIATION = 1.4826
+"""Standard deviation of a normal distribution by its median absolute value."""
+
+
 def roughness(mesh: TriangleMesh) -> float:
     """Return the mean square, in radians, of what normals of neighbouring triangles differ by beyond the bending.
 
@@ -75,6 +79,34 @@ def faired(mesh: TriangleMesh) -> TriangleMesh:
             break
         best, left = smoother, now
     return best if left <= MOSTLY * at_first else mesh
+
+
+def noise(exact: Floats, fair: TriangleMesh) -> float:
+    """Return the standard deviation along the normals of noise that is independent from vertex to vertex.
+
+    The median difference between neighbours of how far they are from the mean of their own neighbours: what bends the
+    surface is nearly the same at both.
+
+    Parameters
+    ----------
+    exact : (n, 3) float64
+        Vertices with the noise.
+    fair : TriangleMesh
+        The same mesh without it, or nearly so, for its normals.
+    """
+    i, j = fair.edges.T
+    inside = np.ones(len(exact), bool)
+    inside[fair.edges[np.bincount(fair.edge_of_side, minlength=len(fair.edges)) == 1]] = False
+    degree = np.bincount(fair.edges.ravel(), minlength=len(exact))
+    total = np.stack([np.bincount(i, x[j], len(x)) + np.bincount(j, x[i], len(x)) for x in exact.T], axis=1)
+    apart = ((exact - total / np.maximum(degree, 1)[:, None]) * fair.vertex_normals()).sum(axis=1)
+    both = inside[i] & inside[j]
+    if not both.any():
+        return 0.0
+    i, j = i[both], j[both]
+    # of unit noise: each is a neighbour of the other, and they have two more in common
+    variance = 2 + 3 / degree[i] + 3 / degree[j] - 4 / (degree[i] * degree[j])
+    return float(MEDIAN_DEVIATION * np.median(np.abs(apart[i] - apart[j]) / np.sqrt(variance)))
 
 
 def _smoothed(mesh: TriangleMesh, strength: float) -> TriangleMesh:

@@ -71,7 +71,7 @@ def constants(node: ast.AST) -> Iterator[str]:
             yield from constants(value)
 
 
-OF_FILES = {"demo", "command_line", "files", "collection"}
+OF_FILES = {"demo", "studio", "command_line", "files", "collection"}
 """Folders whose sentences are for those who read English, as those about damaged data are."""
 
 SAYING = {"attributes", "textures"}

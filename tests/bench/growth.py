@@ -202,7 +202,7 @@ def kept(root: Path, vertices: int = 5000, count: int = 12) -> None:
     held, charts = [], []
     for path in paths:
         charts.append(Chart.of(load_surface(path), 40))
-        charts[-1].places(charts[-1].disc[:100])
+        charts[-1].positions(charts[-1].places[:100])
         held.append(resident(here))
     each = np.polyfit(np.arange(len(held) - 2), held[2:], 1)[0]
     print(f"an atlas keeps {each:.1f} MB of each")

@@ -60,9 +60,10 @@ def marks_right(found: Collection, marks: dict) -> np.ndarray:
     for a, b in found.edges:
         here, there = (np.array(marks[found.names[k]]["landmark_vertex"]) for k in (a, b))
         here, there = (chart.cleaned.vertices_for(x) for chart, x in ((atlas.chart(a), here), (atlas.chart(b), there)))
-        disc_map = atlas[a, b]
-        places = disc_map.source.places(disc_map.backward(disc_map.target.disc[there]))
-        apart = np.linalg.norm(places[:, None] - disc_map.source.vertices[here], axis=2)
+        found_map = atlas[a, b]
+        places, _ = found_map.backward(found_map.target.places[there])
+        apart = found_map.source.positions(places)[:, None] - found_map.source.vertices[here]
+        apart = np.linalg.norm(apart, axis=2)
         right.append(int((apart.argmin(axis=1) == np.arange(len(here))).sum()))
     return np.array(right)
 

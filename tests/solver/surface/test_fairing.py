@@ -4,7 +4,7 @@ from scans import bumps, posed
 from surfaces import planar, rings, spherical_cap
 
 from solver import TriangleMesh
-from solver.surface.fairing import ROUGH, faired, roughness
+from solver.surface.fairing import ROUGH, faired, noise, roughness
 
 
 def noisy(mesh: TriangleMesh, amount: float, seed: int = 0) -> TriangleMesh:
@@ -16,6 +16,21 @@ def noisy(mesh: TriangleMesh, amount: float, seed: int = 0) -> TriangleMesh:
 def test_smooth_surfaces_stay_the_same_to_the_last_bit(mesh) -> None:
     assert roughness(mesh) < ROUGH
     assert faired(mesh) is mesh
+
+
+@pytest.mark.parametrize("amount", [0.001, 0.004])
+def test_the_deviation_of_noise_is_measured(amount: float) -> None:
+    rough = noisy(bumps(4000, seed=2), amount)
+    for seed, mesh in enumerate((rough, posed(rough, 1))):
+        assert noise(mesh.vertices, faired(mesh)) == pytest.approx(amount * mesh.diagonal, rel=0.1), seed
+
+
+def test_without_noise_hardly_any_is_measured() -> None:
+    """What is left comes from triangles of different sizes on a bent surface."""
+    clean = bumps(4000, seed=2)
+    assert noise(clean.vertices, clean) < 2e-4 * clean.diagonal
+    corner = TriangleMesh(np.eye(3), np.array([[0, 1, 2]]))
+    assert noise(corner.vertices, corner) == 0
 
 
 @pytest.mark.parametrize("amount", [0.002, 0.004])
