@@ -89,7 +89,8 @@ def read_transfer(
     for row, way, layers in read:
         found = []
         for layer, wanted in layers:
-            name = row.access.place(target, wanted, {x.place.name for x in pending} | {x[1] for x in found})
+            taken = {name for x in pending for name in (x.place.name, x.place.before or x.place.beside) if name}
+            name = row.access.place(target, wanted, taken | {x[1] for x in found})
             if name is None:
                 warnings.append(f"'{wanted}' is locked on '{target.name}' and left as it is")
                 locked += [wanted] if row.kind == "vertex-groups" else []

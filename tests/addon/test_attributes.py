@@ -191,6 +191,22 @@ def test_a_group_and_an_attribute_of_one_name_arrive_as_two() -> None:
     assert target.data.attributes["Data.001"].data_type == "FLOAT"
 
 
+def test_a_group_and_an_attribute_of_one_name_arrive_beside_a_group_that_has_it() -> None:
+    """The group that stays drives the carried one to the number that the attribute would have."""
+    source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
+    source.data.attributes.new("Data", "FLOAT", "POINT").data[2].value = 3
+    source.vertex_groups.new(name="Data").add((1,), 1.0, "REPLACE")
+    target.vertex_groups.new(name="Data").add((4,), 1.0, "REPLACE")
+    for _ in range(2):
+        plan = plan_transfer(source, target, carrier(source, target), TransferSettings(collisions="number"))
+        plan.write(target)
+        assert [x.name for x in plan.layers if x.source_name == "Data"] == ["Data.001", "Data.002"]
+        assert weights(target, "Data")[4] == 1
+        assert weights(target, "Data.001")[1] == 1
+        assert target.data.attributes["Data.002"].data[2].value == 3
+        assert len(target.vertex_groups) == 2
+
+
 def test_a_ninth_uv_map_is_refused_before_anything_is_written() -> None:
     source, target = make_sheet("Source", 6, flat), make_sheet("Target", 6, flat)
     source.vertex_groups.new(name="Head").add((1,), 1.0, "REPLACE")
