@@ -30,7 +30,8 @@ COLUMNS = ("constant", "descriptors", "stretch", "near rim", "unmatched samples"
 DENSE = np.array([4.586, -1.22, -4.349, 0.0, -7.783, 0.0, 0.0, 0.0])
 """Coefficients of the columns for maps that were bent: of 80 best maps and 18 rivals on 9 kinds of surface. On a kind
 left out the mean confidence is 0.002 to 0.24 away from the share of points below `BOUND`, in bins of confidence 0.02 to
-0.25: too low where one side alone has openings, too high on teeth. Columns with 0 say nothing beyond the others."""
+0.25: too low where one side alone has openings, too high on teeth. Columns with 0 say nothing beyond the others. The
+maps have become better since (docs/accuracy.md): what decides between maps was measured by these."""
 
 MOBIUS = np.array([2.891, -1.415, -4.458, 0.0, -4.952, 0.0, 0.0, 0.0])
 """The same for Möbius maps: 0.01 to 0.24 away, in bins 0.02 to 0.24."""
