@@ -7,6 +7,7 @@ import ast
 import sys
 from collections import Counter
 from pathlib import Path
+from textwrap import wrap
 
 import matplotlib as mpl
 
@@ -17,6 +18,8 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 SOLVER = Path(__file__).resolve().parents[2] / "solver"
 FLOORS = ("surface", "flatten", "search", "bend", "align", "carry", "collection")
 BETWEEN = ("mobius", "stages")
+WIDE = 105
+"""Letters of a line of names."""
 
 
 def modules(folder: str) -> list[str]:
@@ -62,12 +65,10 @@ def main(output: str) -> None:
         )
         axes.add_patch(box)
         axes.text(0.25, level + 0.47, f"{floor}/", weight="bold", size=13, va="center")
-        names = modules(floor)
-        rows = 3 if len(names) > 17 else 2
-        each = -(-len(names) // rows)
-        for row in range(rows):
-            some, height = names[row * each : (row + 1) * each], 0.47 + 0.5 / rows * ((rows - 1) / 2 - row)
-            axes.text(1.75, level + height, "   ".join(some), size=8.5, va="center", family="monospace")
+        rows = wrap("   ".join(modules(floor)), WIDE, break_on_hyphens=False)
+        for row, text in enumerate(rows):
+            height = 0.47 + min(0.25, 0.62 / len(rows)) * ((len(rows) - 1) / 2 - row)
+            axes.text(1.75, level + height, text, size=8.5 if len(rows) < 4 else 7.5, va="center", family="monospace")
     arrows = imports()
     for (above, below), count in arrows.items():
         if below in BETWEEN:
