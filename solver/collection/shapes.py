@@ -95,7 +95,7 @@ def shapes(collection: Collection) -> Shapes:
     vertices[0] = template.vertices[used]
     mesh, areas = TriangleMesh(vertices[0], faces), template.areas[used]
     turned, certainty = [False], [1.0]
-    confidence = {edge: known.mean_confidence for edge, known in zip(collection.edges, collection.figures, strict=True)}
+    confidence = {edge: one.mean_confidence for edge, one in zip(collection.edges, collection.figures, strict=True)}
     for row, number in enumerate(reached[1:], 1):
         path = path_to(collection, root, number)
         places, known[row] = carried_along(template.places[used], path)

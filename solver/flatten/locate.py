@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..surface.mesh import Booleans, Complexes, Floats, Integers, Places, face_neighbours
-from ..surface.nearest import first_corners
+from ..surface.mesh import Booleans, Complexes, Floats, Integers, Places, face_neighbours, first_corners
 
 AT_ONCE = 4096
 """Queries outside whose nearest face is looked for at a time: some 100 MB of candidates."""

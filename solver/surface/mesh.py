@@ -230,6 +230,19 @@ def plural(number: int, noun: str) -> str:
     return f"{number:,} {noun[:-2] + 'ices' if noun.endswith('vertex') else noun + 's'}"
 
 
+def first_corners(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
+    """Return the vertices in use, (k,), and for each the first corner of the faces, (m, 3), that it is.
+
+    >>> first_corners(np.array([[3, 1, 0], [1, 3, 4]]), 5)
+    (array([0, 1, 3, 4]), array([2, 1, 0, 5]))
+    """
+    first = np.full(vertex_count, -1)
+    corners = faces.ravel()[::-1]
+    first[corners] = np.arange(len(corners) - 1, -1, -1)  # of several writes the last one stays
+    used = np.flatnonzero(first >= 0)
+    return used, first[used]
+
+
 def face_neighbours(faces: Integers, vertex_count: int) -> Integers:
     """Return the face across the side opposite each corner, (m, 3), -1 on the boundary, of a manifold mesh."""
     sides = directed_edges(faces)

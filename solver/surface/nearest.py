@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .kept import kept
-from .mesh import Booleans, Floats, Integers, TriangleMesh
+from .mesh import Booleans, Floats, Integers, TriangleMesh, first_corners
 
 SUITABLE = 2
 """Samples around whose faces `SurfacePoints.most_alike` looks."""
@@ -213,19 +213,6 @@ def in_turn(work: Callable[[int], None], each: Sequence[int], progress: Callable
         finally:
             for one in begun:
                 one.cancel()
-
-
-def first_corners(faces: Integers, vertex_count: int) -> tuple[Integers, Integers]:
-    """Return the vertices in use, (k,), and for each the first corner of the faces, (m, 3), that it is.
-
-    >>> first_corners(np.array([[3, 1, 0], [1, 3, 4]]), 5)
-    (array([0, 1, 3, 4]), array([2, 1, 0, 5]))
-    """
-    first = np.full(vertex_count, -1)
-    corners = faces.ravel()[::-1]
-    first[corners] = np.arange(len(corners) - 1, -1, -1)  # of several writes the last one stays
-    used = np.flatnonzero(first >= 0)
-    return used, first[used]
 
 
 def nearest_in_triangle(points: Floats, corners: Floats) -> Floats:
