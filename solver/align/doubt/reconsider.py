@@ -20,12 +20,10 @@ from ...stages import Part
 from ...surface.mesh import Booleans, Floats
 from ..maps.dense import bent_densely, drafted_from
 from ..result.alignment import Alignment
+from ..result.confidence import DOUBTFUL
 from ..surfaces.remark import Remark
 from ..surfaces.side_by_side import Work, side_by_side, stages_of
 from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, turned, unlike
-
-DOUBTFUL = 0.5
-"""Mean confidence up to which the whole map is doubted aloud."""
 
 FITS = 0.75
 """Mean confidence from which on a map that is not mirrored is taken as it is.

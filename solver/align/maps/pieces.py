@@ -31,8 +31,11 @@ def overlap_of(
     target_part: Piece | None,
     clock: Part,
     landmarks: Integers | None,
-) -> Overlap | None:
-    """Align the parts that the surfaces seem to share, by a draft of the whole; None if it was mistaken."""
+) -> tuple[Overlap, bool] | None:
+    """Align the parts that the surfaces seem to share, by a draft of the whole; and whether it was surely not mistaken.
+
+    None where they are too small.
+    """
     if source_part is None or target_part is None:
         return None
     source_share = source_part.mesh.area / found.source.mesh.area
@@ -61,8 +64,7 @@ def overlap_of(
         inner = searched(source, target, settings, searching, pairs)
     except MeshError:  # too small a piece to flatten
         return None
-    if not _surely_better(inner.matched_weights, found.matched_weights):
-        return None
+    sure = _surely_better(inner.matched_weights, found.matched_weights)
     inner = challenged(inner, searching)
     face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
@@ -81,7 +83,7 @@ def overlap_of(
         clock.within(0.6, 1.0),
     )
     inner = replace(inner, bending=bending, counterpart=there)
-    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
+    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric), sure
 
 
 def _surely_better(parts: Floats, whole: Floats) -> bool:
