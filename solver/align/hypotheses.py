@@ -97,7 +97,7 @@ def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
 
     Where a mirrored map, drafted, puts the target, the source's own plane of symmetry mirrors it once more.
     """
-    plane = mirror_plane(draft.onto, matched.source_descriptors) if matched.other is not None else None
+    plane = mirror_plane(draft.onto) if matched.other is not None else None
     if plane is None:
         return None
     target = matched.target.mesh
