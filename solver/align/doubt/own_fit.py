@@ -60,9 +60,13 @@ class OwnFit:
         return lying, self._rim[near]
 
     def lying(self, points: Floats, normals: Floats, near: float) -> tuple[Floats, Booleans]:
-        """Return the nearest points of the surface, (q, 3), and which points lie so near, and as it faces there."""
-        other, facing, _ = self.onto.at(*self.onto.nearest_point(points, normals))
-        return other, (np.linalg.norm(other - points, axis=1) < near) & ((facing * normals).sum(axis=1) > ALONG)
+        """Return the nearest points of the surface, (q, 3), and which points lie so near, and as it faces there.
+
+        What has its nearest point on a boundary may lie past it.
+        """
+        other, facing, at_rim = self.onto.at(*self.onto.nearest_point(points, normals))
+        near_by = np.linalg.norm(other - points, axis=1) < near
+        return other, near_by & ((facing * normals).sum(axis=1) > ALONG) & ~at_rim
 
     def borne_out(self, points: Floats, normals: Floats, told: Booleans) -> tuple[float, float]:
         """Return which share of moved points lies on the surface: of those not past its boundaries, and of all.
