@@ -20,6 +20,7 @@ from ..surface.nearest import SurfacePoints
 from .agreement import descriptor_distance
 from .alignment import Alignment
 from .mobius_map import implied, improved, rival_of, taking, unproved, valued
+from .overlap import shared_nodes
 from .own_mirror import mirror_plane, mirrored
 
 POSE_NODES = 300
@@ -139,6 +140,19 @@ def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
         found.source, found.source_descriptors, found.target_descriptors[used], face[used], barycentric[used]
     )
     areas = found.target.mesh.vertex_areas[used]
+    return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
+
+
+def roughly_unlike(found: Alignment, draft: Draft) -> float:
+    """Return the same by the nodes of the draft alone."""
+    some = shared_nodes(draft, found.source, found.target)
+    if not some.any():
+        return np.inf
+    nodes = TriangleMesh(draft.now, draft.flat.faces)
+    face, barycentric = draft.onto.nearest_point(draft.now[some], nodes.vertex_normals()[some])
+    there = found.target_descriptors[draft.few.nodes[some]]
+    distance = descriptor_distance(found.source, found.source_descriptors, there, face, barycentric)
+    areas = draft.flat.vertex_areas[some]
     return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
 
 

@@ -107,7 +107,7 @@ def _lying(onto: SurfacePoints, points: Floats, normals: Floats, near: float) ->
     face, barycentric = onto.nearest_point(points, normals)
     corners = onto.mesh.faces[face]
     other = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners])
-    facing = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertex_normals()[corners])
+    facing = np.einsum("qk,qkd->qd", barycentric, onto.normals[corners])
     return other, (np.linalg.norm(other - points, axis=1) < near) & ((facing * normals).sum(axis=1) > ALONG)
 
 
