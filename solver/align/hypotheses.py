@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -69,8 +69,10 @@ def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]
         )
 
 
-def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
+def by_pose(matched: Alignment, onto: SurfacePoints, known: Callable[[Floats], bool]) -> Hypothesis | None:
     """Return what the rigid pose leads to in which the target lies best on the source, mirrored or not if both may be.
+
+    None if it is `known` where that puts the target's vertices, (n, 3).
 
     Parameters
     ----------
@@ -90,6 +92,8 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
         turn = Rotation.align_vectors(x - there, all_vertices[few.nodes] - here)[0]
         poses.append((apart, reflected, turn.apply(all_vertices - here) + there, whole.faces))
     _, reflected, start, faces = min(poses, key=lambda pose: pose[:2])
+    if known(start):
+        return None
     return _in_pose(matched, onto, TriangleMesh(start, faces), reflected, "one that a rigid pose implies")
 
 

@@ -225,7 +225,12 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
         works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
-        works.append(lambda _: [by_pose(matched, draft.onto)])
+        nodes = draft.few.nodes
+
+        def known(start: Floats) -> bool:
+            return found.unfolded < UNFOLDED and _same(start[nodes], draft.now)
+
+        works.append(lambda _: [one for one in (by_pose(matched, draft.onto, known),) if one is not None])
     if found.mean_confidence <= DOUBTFUL:
         works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)

@@ -68,7 +68,8 @@ def test_a_rigid_pose_implies_the_right_map(found):
     """Found without the search's map: the Möbius transformation, and where the bending begins."""
     onto = drafted(found.mobius, found.source, found.target).onto
     wrong = replace(found, mobius=replace(found.mobius, theta=found.mobius.theta + 2.0))
-    hypothesis = by_pose(wrong, onto)
+    hypothesis = by_pose(wrong, onto, lambda _: False)
+    assert hypothesis is not None
     implied = hypothesis.alignment
     assert not implied.mobius.reflected
     assert np.abs(implied.mobius.z - found.mobius.z) < 0.02
