@@ -20,6 +20,7 @@ from ..bend.plate import RIM_REACH
 from ..stages import Part
 from ..surface.mesh import Booleans, Floats
 from .alignment import Alignment
+from .chances import draft_may_reach, may_reach
 from .dense import begun, bent_densely, drafted_from
 from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
 from .remark import Remark
@@ -148,10 +149,10 @@ def _drafted(each: Hypothesis, like: Draft, way: int | None, note: Callable[[flo
 
 
 def _roughly_drafted(
-    each: Hypothesis, like: Draft, way: int | None, note: Callable[[float], None]
+    each: Hypothesis, like: Draft, note: Callable[[float], None]
 ) -> tuple[float, Hypothesis, Draft] | None:
     """Return the same by a draft by `SCREENED` vertices, asked at these."""
-    draft = begun(each.alignment, stages_of(note), each.start, SCREENED, like, way)
+    draft = begun(each.alignment, stages_of(note), each.start, SCREENED, like)
     differs = roughly_unlike(each.alignment, draft)
     return (differs * apart(draft), each, draft) if differs <= ROUGHLY * UNLIKE else None
 
@@ -181,8 +182,9 @@ def _screened(
     likewise = begun(matched, clock.part(0.0, 0.1), None, SCREENED, first[0], first[0].way)
     least = roughly_unlike(matched, likewise) * apart(likewise)
     clock.begin("reconsider", "Trying another map", 0.1)
-    works = [partial(_roughly_drafted, each, likewise, None) for each in hypotheses]
+    works = [partial(_roughly_drafted, each, likewise) for each in hypotheses]
     drafts = _in_order(side_by_side(works, clock.within(0.1, 1.0), threads=found.settings.threads != 1))
+    drafts = [one for one in drafts if draft_may_reach(one[1].alignment, one[2], _needed(found, one[1].alignment))]
     # at the nodes, which all drafts by few share
     known = [] if found.unfolded >= UNFOLDED else [first[0].places()[likewise.few.nodes]]
     others = []
@@ -215,6 +217,9 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
 
+    def worth(one: Alignment, samples: float) -> bool:
+        return may_reach(samples, len(one.source_samples), _needed(found, one))
+
     turns: list[Hypothesis] = []
     works: list[Work[list[Hypothesis]]] = []
     other = turned(matched)
@@ -222,7 +227,7 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
         turns.append(Hypothesis(other, None, what))
     if other is not None and matched.mobius.reflected:
-        works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
+        works.append(lambda note: list(further(other, MAXIMA - 1, partial(worth, other), stages_of(note))))
         works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
         nodes = draft.few.nodes
@@ -232,9 +237,22 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
 
         works.append(lambda _: [one for one in (by_pose(matched, draft.onto, known),) if one is not None])
     if found.mean_confidence <= DOUBTFUL:
-        works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
+        works.append(lambda note: list(further(matched, MAXIMA, partial(worth, matched), stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
-    return [*turns, *chain.from_iterable(some)]
+    tried = [*turns, *chain.from_iterable(some)]
+    return [each for each in tried if worth(each.alignment, each.alignment.value)]
+
+
+def _needed(found: Alignment, other: Alignment) -> float:
+    """Return how much of the target another map has to make sure, at least, to be taken, or to be spoken of.
+
+    See `_decided`: a map that fits may be taken beside one that makes more sure.
+    """
+    if other.mobius.reflected == found.mobius.reflected:
+        more = PROVED
+    else:
+        more = 1 / OPEN if other.mobius.reflected else 1 / MIRRORED
+    return min(FITS, more * _sure(found))
 
 
 def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:
