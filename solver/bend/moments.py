@@ -22,18 +22,20 @@ KEPT = 3
 """Poses that are improved until they settle."""
 
 
-def posed(mesh: TriangleMesh, onto: SurfacePoints) -> tuple[Floats, float]:
+def posed(mesh: TriangleMesh, onto: SurfacePoints, roughly: SurfacePoints) -> tuple[Floats, float]:
     """Return the vertices, (n, 3), of a surface in the rigid pose that lies best on another, and its `misfit`.
 
     Of the 24 turns that lay axes along axes, since those of nearly equal moments may be exchanged, each improved by
-    closest points (`in_poses`). The mesh has the other's scale, and orientation, already.
+    closest points (`in_poses`). The mesh has the other's scale, and orientation, already; `roughly` is the other by few
+    vertices, on which poses are compared: most lie far off, where a tree of many points takes long to answer.
     """
     middle, axes = _moments(mesh)
     other, other_axes = _moments(onto.mesh)
     starts = np.stack([(mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other for turn in _turns()])
-    tried = in_poses(mesh, starts, onto, FEW_ROUNDS, FEW)
-    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in tried], onto, ASKED)
-    kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], onto)
+    tried = in_poses(mesh, starts, roughly, FEW_ROUNDS, FEW)
+    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in tried], roughly, ASKED)
+    kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], roughly, most=FEW)
+    kept = in_poses(mesh, kept, onto)
     apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in kept], onto, MOST)
     best = int(np.argmin(apart))
     return kept[best], float(apart[best])
