@@ -27,7 +27,7 @@ from ..solver import (
     flatten,
     topology,
 )
-from ..solver.align.prepared import cleaning_notes, flattening_notes
+from ..solver.align.surfaces.prepared import cleaning_notes, flattening_notes
 from ..solver.flatten.distortion import signed_areas
 from ..solver.surface.mesh import Booleans, Floats, Integers, plural
 from ..solver.surface.tidy import Piece

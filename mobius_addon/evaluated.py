@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..solver import Correspondence, TriangleMesh
-from ..solver.align.confidence import BOUND
+from ..solver.align.result.confidence import BOUND
 from ..solver.carry.parts import pieces
 from ..solver.surface.mesh import Floats, Integers
 from ..solver.surface.nearest import SurfacePoints

@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ..solver import Cleaned, MeshError, Topology, topology
-from ..solver.align.held import held
+from ..solver.align.cut.held import held
 from ..solver.surface.cleaning import LEFT_OUT
 from . import edits
 from .computation import Repair, in_order

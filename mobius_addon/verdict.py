@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ..solver.align.judgement import Judgement, judged
-from ..solver.align.remark import Remark
+from ..solver.align.surfaces.remark import Remark
 
 LEVELS = {
     "good": (n_("Good: {:.0%} matched"), "CHECKMARK"),

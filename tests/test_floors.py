@@ -9,6 +9,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SOLVER = ROOT / "solver"
 FLOORS = ("surface", "stages", "mobius", "flatten", "search", "bend", "align", "carry", "collection")
 """From the ground up: folders, and the two modules that stand between them."""
+ROOMS = ("surfaces", "result", "maps", "doubt", "cut", "parts")
+"""The same within `align`, whose modules outside of folders stand above them."""
 
 
 def modules() -> list[Path]:
@@ -54,6 +56,15 @@ def test_a_floor_imports_only_from_those_below(floor: str) -> None:
             assert name[:1] != ("solver",), f"{path} imports the solver as a whole"
             if name[0] != "":
                 assert name[0] in allowed, f"{path} imports {'.'.join(name)}, which is not below it"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_folder_of_align_imports_only_from_those_below(room: str) -> None:
+    assert {path.parent.name for path in SOLVER.glob("align/*/*.py")} == set(ROOMS)
+    allowed = ROOMS[: ROOMS.index(room) + 1]
+    for path in SOLVER.glob(f"align/{room}/*.py"):
+        for name in imported(path):
+            assert name[0] != "align" or name[1] in allowed, f"{path} imports {'.'.join(name)}, which is not below it"
 
 
 def test_no_circle_among_modules() -> None:

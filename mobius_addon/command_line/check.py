@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Say a line about each mesh and return the exit status, the worst of all."""
     from ...solver import MeshError, verdict
-    from ...solver.align.held import held
+    from ...solver.align.cut.held import held
     from ..files import Unreadable, chosen, import_meshes, new_scene, require_places, split_object_name, together
     from ..mesh_data import read_surface
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...solver import TriangleMesh
-from ...solver.align.confidence import BOUND
+from ...solver.align.result.confidence import BOUND
 from ...solver.surface.mesh import Floats, Integers
 from ...solver.surface.nearest import SurfacePoints
 from .reading import Imported

@@ -11,8 +11,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from scipy.spatial import KDTree
 
 from ... import solver
-from ...solver.align.confidence import expected_error
 from ...solver.align.judgement import judge
+from ...solver.align.result.confidence import expected_error
 from ...solver.surface.mesh import Booleans, Floats
 from .. import landmarks, results, stored_alignment
 from ..attributes import MATCHED_GROUP, SHARED_COLOR, SHARED_LAYOUT, piece_of, restored_on_failure

@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ...solver import MeshError, Topology, TriangleMesh, topology, verdict
-from ...solver.align.held import held
+from ...solver.align.cut.held import held
 from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface

@@ -3,10 +3,10 @@
 The stages below are put in order here, partial overlaps cut out, rivals compared, and every point given a confidence.
 """
 
-from .alignment import Alignment
 from .pipeline import align
-from .prepared import Surface, prepare
-from .settings import AlignSettings
-from .surface_file import load_surface, save_surface
+from .result.alignment import Alignment
+from .surfaces.prepared import Surface, prepare
+from .surfaces.settings import AlignSettings
+from .surfaces.surface_file import load_surface, save_surface
 
 __all__ = ["AlignSettings", "Alignment", "Surface", "align", "load_surface", "prepare", "save_surface"]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .alignment import Alignment
-from .confidence import FITTED
-from .cutting import MUCH, shrunk
-from .prepared import LITTLE, Surface
-from .reconsider import UNLIKE
-from .remark import Kind, Remark
+from .cut.cutting import MUCH, shrunk
+from .doubt.reconsider import UNLIKE
+from .result.alignment import Alignment
+from .result.confidence import FITTED
+from .surfaces.prepared import LITTLE, Surface
+from .surfaces.remark import Kind, Remark
 
 FEW = FITTED // 2
 """Source points below which a surface is called too coarse: of 8 sheets with 30 vertices inside 3 were claimed where

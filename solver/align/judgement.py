@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from .alignment import Alignment
-from .confidence import MATCHED
 from .diagnosis import CROPPED
-from .reconsider import DOUBTFUL, FITS
-from .remark import Kind, Remark
+from .doubt.reconsider import DOUBTFUL, FITS
+from .result.alignment import Alignment
+from .result.confidence import MATCHED
+from .surfaces.remark import Kind, Remark
 
 Level = Literal["good", "check", "doubtful"]
 

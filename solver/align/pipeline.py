@@ -9,23 +9,23 @@ import numpy.typing as npt
 
 from ..stages import Part, Progress, Stages
 from ..surface.mesh import MeshError, TriangleMesh
-from .alignment import Alignment
-from .completing import completed
-from .confidence import BOUND
-from .cutting import fitting_pieces, like_pieces
-from .dense import bent_densely, drafted_from
+from .cut.cutting import fitting_pieces, like_pieces
 from .diagnosis import causes, coarse, deep
-from .inside_out import turned_round
-from .landmarks import own_landmarks
-from .lips import with_lips_joined
-from .main_parts import other_mains
-from .mobius_map import roughly_aligned
-from .other_rim import with_other_rim
-from .prepared import Surface
-from .reconsider import DOUBTFUL, FITS, reconsidered
-from .remark import Remark
-from .settings import AlignSettings
-from .side_by_side import told_apart
+from .doubt.inside_out import turned_round
+from .doubt.other_rim import with_other_rim
+from .doubt.reconsider import DOUBTFUL, FITS, reconsidered
+from .maps.dense import bent_densely, drafted_from
+from .maps.mobius_map import roughly_aligned
+from .parts.completing import completed
+from .result.alignment import Alignment
+from .result.confidence import BOUND
+from .surfaces.landmarks import own_landmarks
+from .surfaces.lips import with_lips_joined
+from .surfaces.main_parts import other_mains
+from .surfaces.prepared import Surface
+from .surfaces.remark import Remark
+from .surfaces.settings import AlignSettings
+from .surfaces.side_by_side import told_apart
 
 
 def align(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..align.alignment import Alignment
-from ..align.confidence import MATCHED
-from ..align.whole import Whole
+from ..align.result.alignment import Alignment
+from ..align.result.confidence import MATCHED
+from ..align.result.whole import Whole
 from ..flatten.sphere import Flat
 from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..align.confidence import BOUND
+from ..align.result.confidence import BOUND
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.topology import topology

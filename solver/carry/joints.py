@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..align.space import MOST_POINTS, Similarities, SpaceMap
+from ..align.parts.space import MOST_POINTS, Similarities, SpaceMap
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from .correspond import Correspondence
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..align.alignment import Alignment
+from ..align.result.alignment import Alignment
 from ..surface.mesh import TriangleMesh
 from .correspond import Correspondence
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..align.confidence import BOUND
+from ..align.result.confidence import BOUND
 from ..surface.mesh import Booleans, Floats, Integers
 from ..surface.statistics import weighted_median
 

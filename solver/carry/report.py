@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..align.alignment import Alignment
-from ..align.confidence import expected_error
 from ..align.judgement import judge
-from ..align.whole import Whole
+from ..align.result.alignment import Alignment
+from ..align.result.confidence import expected_error
+from ..align.result.whole import Whole
 from ..mobius import as_plain
 from ..search.outcome import SphereSearchResult
 from ..surface.mesh import Booleans

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..align.surface_file import load_surface
+from ..align.surfaces.surface_file import load_surface
 from ..carry.fill import nearest_known
 from ..surface.mesh import TriangleMesh
 from .chart import Carried, Chart, ChartMap

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..align.confidence import BOUND
-from ..align.prepared import Surface
+from ..align.result.confidence import BOUND
+from ..align.surfaces.prepared import Surface
 from ..flatten.domain import Domain
 from ..flatten.locate import TriangulatedDisc
 from ..mobius import Mobius, SphereMobius

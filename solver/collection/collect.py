@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..align.settings import AlignSettings
+from ..align.surfaces.settings import AlignSettings
 from ..surface.mesh import Booleans, Floats
 from .atlas import Atlas
 from .cycles import Edge, closing_error, edge_errors, specimen_errors, suspect, triangles

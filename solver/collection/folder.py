@@ -19,7 +19,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
-from ..align.settings import AlignSettings
+from ..align.surfaces.settings import AlignSettings
 from .lock import locked
 from .pair import Figures
 from .tasks import Result, whole_file

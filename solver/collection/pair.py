@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..align.alignment import Alignment
 from ..align.judgement import Judgement, coverage, judged
-from ..align.remark import Remark
+from ..align.result.alignment import Alignment
+from ..align.surfaces.remark import Remark
 from ..mobius import Mobius, SphereMobius, as_plain, from_plain
 from .distance import EvenFlow, continuous_procrustes
 

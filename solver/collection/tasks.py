@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from ..align.pipeline import align
-from ..align.prepared import Surface, prepare
-from ..align.settings import AlignSettings
-from ..align.surface_file import load_surface, save_surface
+from ..align.surfaces.prepared import Surface, prepare
+from ..align.surfaces.settings import AlignSettings
+from ..align.surfaces.surface_file import load_surface, save_surface
 from ..carry.correspond import correspond
 from ..carry.map_file import save_map
 from ..surface.mesh import Floats, MeshError, TriangleMesh

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from ..align.settings import AlignSettings
+from ..align.surfaces.settings import AlignSettings
 from ..surface.mesh import MeshError
 from .cycles import Edge
 from .engine import Open, completed

@@ -28,7 +28,7 @@ from mobius_extension.mobius_addon.computation import Repair  # noqa: E402
 from mobius_extension.mobius_addon.german import GERMAN  # noqa: E402
 from mobius_extension.solver import Progress  # noqa: E402
 from mobius_extension.solver.align.judgement import judged  # noqa: E402
-from mobius_extension.solver.align.remark import Remark  # noqa: E402
+from mobius_extension.solver.align.surfaces.remark import Remark  # noqa: E402
 
 
 class Layout:

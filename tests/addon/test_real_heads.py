@@ -14,7 +14,7 @@ for folder in (ROOT, ROOT / "tests" / "solver"):
         sys.path.append(str(folder))
 
 from solver import AlignSettings, align, correspond, prepare  # noqa: E402
-from solver.align.surface_file import load_surface, save_surface  # noqa: E402
+from solver.align.surfaces.surface_file import load_surface, save_surface  # noqa: E402
 from tests.bench.heads.people import read_head  # noqa: E402
 from tests.bench.heads.scores import errors  # noqa: E402
 from tests.bench.heads.targets import target_of  # noqa: E402

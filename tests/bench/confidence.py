@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from scipy.special import expit
 
 from solver import Alignment, AlignSettings, align
-from solver.align.confidence import BOUND, COLUMNS
+from solver.align.result.confidence import BOUND, COLUMNS
 
 from .correspondence.pairs import Pair
 from .correspondence.sets import SETS

@@ -22,7 +22,7 @@ import numpy as np
 import psutil
 
 from solver import AlignSettings, TriangleMesh
-from solver.align.surface_file import load_surface
+from solver.align.surfaces.surface_file import load_surface
 from solver.collection import Collection, Plan, Specimen, Told, collect, processes
 from solver.collection.chart import Chart
 from solver.collection.cluster import Cluster

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from solver import AlignSettings
-from solver.align.objective import interior, source_points
+from solver.align.surfaces.objective import interior, source_points
 from solver.surface.descriptors import diffused_curvatures
 from solver.surface.sampling import farthest_points
 from solver.surface.statistics import standardised

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
 from solver import Alignment, AlignSettings, Mobius, align, correspond, search
-from solver.align.objective import source_points
+from solver.align.surfaces.objective import source_points
 from solver.flatten.locate import TriangulatedDisc
 from solver.search.fit import algebraic_fit, fitted
 from solver.surface.descriptors import diffused_curvatures

@@ -23,8 +23,8 @@ from solver import (
     save_surface,
     verdict,
 )
-from solver.align.dense import drafted_from
-from solver.align.hypotheses import by_pose
+from solver.align.doubt.hypotheses import by_pose
+from solver.align.maps.dense import drafted_from
 from solver.flatten.distortion import signed_volumes
 from solver.flatten.locate import TriangulatedSphere
 from solver.stages import Stages

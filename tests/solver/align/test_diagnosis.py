@@ -8,7 +8,7 @@ from damages import Damage, handle, islands, rim_spikes, slit, spikes, undamaged
 from scans import bumps, posed
 
 from solver import AlignSettings, TriangleMesh, align, correspond, report
-from solver.align.confidence import FITTED, unmatched_share
+from solver.align.result.confidence import FITTED, unmatched_share
 
 QUICK = AlignSettings(reflect="never")
 

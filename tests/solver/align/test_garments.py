@@ -8,8 +8,8 @@ from garments import Form, band_form, ring_form, tube_form, woven
 from scans import percent, places, posed
 
 from solver import Alignment, AlignSettings, MeshError, align, correspond
+from solver.align.doubt.reconsider import FITS
 from solver.align.judgement import judge
-from solver.align.reconsider import FITS
 
 QUICK = AlignSettings(samples=60, targets=500, reflect="never")
 

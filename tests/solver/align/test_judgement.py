@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import solver
-from solver.align.confidence import BOUND, expected_error
 from solver.align.judgement import DONE, judge, judged
-from solver.align.remark import Remark
+from solver.align.result.confidence import BOUND, expected_error
+from solver.align.surfaces.remark import Remark
 from tests.solver.scans import bumps
 
 DOUBT = Remark("doubtful", "doubtful: more likely than not the map errs by more than 2 % of the source's diagonal")

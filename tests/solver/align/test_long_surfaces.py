@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import AlignSettings, MeshError, TriangleMesh, align, correspond, flatten, verdict
-from solver.align.held import held
+from solver.align.cut.held import held
 
 
 def belt(length: int, rows: int) -> TriangleMesh:

@@ -10,9 +10,9 @@ from scans import bumps, mirrored, similarity
 from surfaces import spherical_cap
 
 from solver import AlignSettings, Cleaned, TriangleMesh, align, correspond
-from solver.align.alignment import Alignment
-from solver.align.completing import completed
-from solver.align.whole import Whole
+from solver.align.parts.completing import completed
+from solver.align.result.alignment import Alignment
+from solver.align.result.whole import Whole
 from solver.surface.parts import Parts
 
 SCALE, TURN, SHIFT = similarity(np.random.default_rng(5))

@@ -6,7 +6,7 @@ import pytest
 from scans import bumps, mirrored, mutual_pairs, percent, places, posed, remeshed, shuffled
 
 from solver import Alignment, AlignSettings, Cancelled, MeshError, TriangleMesh, align, correspond, report
-from solver.align.objective import compatibility, covering_radius
+from solver.align.surfaces.objective import compatibility, covering_radius
 from solver.mobius import hyperbolic_distance
 
 SMALL = AlignSettings(samples=40, targets=300, reflect="never")

@@ -3,7 +3,7 @@ import pytest
 from correspondences import on_itself, sheet
 
 from solver import TriangleMesh
-from solver.align.space import MOST_POINTS
+from solver.align.parts.space import MOST_POINTS
 from solver.carry.joints import carried_joints
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scans import bumps, posed
 
 from solver import Mobius, TriangleMesh, flatten
-from solver.align.prepared import Surface
+from solver.align.surfaces.prepared import Surface
 from solver.collection.chart import Chart, ChartMap, carried_along, mirrored
 from solver.collection.cycles import (
     SUSPECT,

@@ -1,0 +1,1 @@
+"""Where a map is in doubt: what else it might be, and which of several is taken."""

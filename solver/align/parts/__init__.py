@@ -1,0 +1,1 @@
+"""Everything beside the main pair: which parts belong together, and what rides along."""
