@@ -29,14 +29,25 @@ DRAFTS = 4
 
 
 def drafted_from(
-    found: Alignment, clock: Part, start: Floats | None = None, count: int = NODES, like: Draft | None = None
+    found: Alignment,
+    clock: Part,
+    start: Floats | None = None,
+    like: Draft | None = None,
+    way: int | None = None,
 ) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
 
     It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
-    `count` vertices of the target are bent. What does not depend on the map is taken from another draft of the same
-    surfaces, `like`.
+    `like` and `way` are as for `bend.drafted`.
     """
+    draft = begun(found, clock, start, NODES, like, way)
+    return draft, *shared(draft, found.source, found.target, clock.within(0.15, 0.2))
+
+
+def begun(
+    found: Alignment, clock: Part, start: Floats | None, count: int, like: Draft | None, way: int | None = None
+) -> Draft:
+    """Return a draft of the bending by `count` vertices of the target, begun as one of `drafted_from`."""
     clock.begin("bend", "Bending", 0.0)
     source, target = found.source, found.target
     believed = trust(
@@ -48,8 +59,7 @@ def drafted_from(
         found.difference,
     )
     tell = clock.within(0.0, 0.15)
-    draft = drafted(found.mobius, source, target, believed, start, count=count, progress=tell, like=like)
-    return draft, *shared(draft, source, target, clock.within(0.15, 0.2))
+    return drafted(found.mobius, source, target, believed, start, count=count, progress=tell, like=like, way=way)
 
 
 def bent_densely(
