@@ -99,8 +99,9 @@ def bent_densely(
         shared_alone = _of_overlap(found, cut[0], remarks)
         if cut[1]:
             return shared_alone
-    clock.begin("bend", "Bending", 0.5)
-    bending = finished(draft, source, target, progress=clock.within(0.5, 1.0))
+    share = 0.5 if cut is None else 0.8
+    clock.begin("bend", "Bending", share)
+    bending = finished(draft, source, target, progress=clock.within(share, 1.0))
     as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
     if cut is not None and agrees_better(shared_alone, as_wholes):
         return shared_alone

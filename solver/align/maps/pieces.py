@@ -60,7 +60,7 @@ def overlap_of(
             )
             for part in (source_part, target_part)
         )
-        searching = clock.part(0.2, 0.5, "overlap")
+        searching = clock.part(0.2, 0.4, "overlap")
         inner = searched(source, target, settings, searching, pairs)
     except MeshError:  # too small a piece to flatten
         return None
@@ -69,18 +69,18 @@ def overlap_of(
     face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
 
-    clock.begin("bend", "Bending", 0.5)
+    clock.begin("bend", "Bending", 0.4)
     scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
     start = scale * (draft.places()[target_part.vertices] - middle)
-    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
-    _, there = shared(again, inner.source, inner.target, clock.within(0.6, 0.6))
+    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.4, 0.5))
+    _, there = shared(again, inner.source, inner.target, clock.within(0.5, 0.5))
     bending = finished(
         again,
         inner.source,
         inner.target,
         _alike(again, inner, source_part.cut, target_part.cut),
-        clock.within(0.6, 1.0),
+        clock.within(0.5, 0.8),
     )
     inner = replace(inner, bending=bending, counterpart=there)
     return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric), sure

@@ -6,8 +6,11 @@ import numpy as np
 
 from ...surface.mesh import Floats, Integers
 from ..result.alignment import Alignment
-from ..result.confidence import DOUBTFUL, SURE
+from ..result.confidence import DOUBTFUL
 from ..result.overlap import BEYOND
+
+EITHER_WAY = 1.96
+"""Standard errors up to which chance may reach: two-sided, 95 %, as either map may be the better one."""
 
 
 def agrees_better(cut: Alignment, whole: Alignment) -> bool:
@@ -31,7 +34,7 @@ def agrees_better(cut: Alignment, whole: Alignment) -> bool:
     gain = (_apart(whole, both) - _apart(cut, both))[moved]
     mean = gain @ areas / areas.sum()
     deviation = np.sqrt((gain - mean) ** 2 @ areas / areas.sum())
-    return bool(mean * np.sqrt(count) > SURE * deviation)
+    return bool(mean * np.sqrt(count) > EITHER_WAY * deviation)
 
 
 def _places(found: Alignment, vertices: Integers) -> Floats:
