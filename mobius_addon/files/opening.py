@@ -155,6 +155,11 @@ def _append(paths: list[Path], names: list[str]) -> list[bpy.types.Object]:
     found: dict[tuple[Path, str], bpy.types.Object] = {}
     for path in dict.fromkeys(paths):
         own = [name for other, name in zip(paths, names, strict=True) if other == path]
+        if not path.is_file():  # its library is packed
+            raise Unreadable(
+                f"'{own[0]}' is linked from '{path}', which is not there: put it back, or make '{own[0]}' local first "
+                "(Object > Relations > Make Local > All)"
+            )
         try:
             with quiet(), bpy.data.libraries.load(str(path)) as (_, wanted):
                 wanted.objects = list(own)  # whose names become objects

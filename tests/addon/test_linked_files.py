@@ -152,3 +152,21 @@ def test_a_library_that_is_gone_is_named(tmp_path: Path) -> None:
     (tmp_path / "people.blend").unlink()
     with pytest.raises(files.Unreadable, match=r"no mesh object named 'Body': it has 'Cloth'; it links 'people.blend'"):
         files.import_mesh(f"{tmp_path / 'shot.blend'}:Body")
+
+
+def test_a_packed_library_that_is_gone_is_read_in_its_file_and_named_for_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    build(tmp_path / "shot.blend", tmp_path / "people.blend", by_object)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.file.pack_libraries()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    (tmp_path / "people.blend").unlink()
+    source, out = f"{tmp_path}/shot.blend:Body", ["-o", str(tmp_path / "out.blend"), *QUICK]
+    assert main(["transfer", source, f"{tmp_path}/shot.blend:Cloth", *out]) == 0
+    files.new_scene()
+    make_sheet("Other", 16)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    assert main(["transfer", source, f"{tmp_path}/other.blend", *out]) == 2
+    assert "'Body' is linked from" in (said := capsys.readouterr().err)
+    assert "which is not there: put it back, or make 'Body' local first" in said
