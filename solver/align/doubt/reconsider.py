@@ -1,9 +1,9 @@
 """Which of several maps is taken, where the search's best is in doubt: the one place that decides.
 
-Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Each is drafted, and
-given up there if another draft fits clearly better; what is left is bent like the first, and all are judged by the same
-calibrated measure: how much of the target is surely right (`Alignment.confidence`). A mirrored map has to be better
-than any other by more than chance.
+Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Those of which the
+samples promise enough (`chances`) are drafted, by few vertices first, and given up there if another draft fits clearly
+better; what is left is bent like the first, and all are judged by the same calibrated measure: how much of the target
+is surely right (`Alignment.confidence`). A mirrored map has to be better than any other by more than chance.
 """
 
 from __future__ import annotations
