@@ -28,6 +28,9 @@ from .own_mirror import mirror_plane, mirrored
 POSE_NODES = 300
 """Vertices of the target that look for a rigid pose."""
 
+SIDES = "one of opposite sides of something symmetric"
+"""What `by_own_mirror` leads to."""
+
 ROUGH_NODES = 1000
 """Vertices of the source, about, by which poses are compared: on 14 hands, feet, ears, heads and teeth the pose is the
 same by all of them, in half the time."""
@@ -123,7 +126,7 @@ def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
 
     Where a mirrored map, drafted, puts the target, the source's own plane of symmetry mirrors it once more.
     """
-    plane = mirror_plane(draft.onto, matched.source_descriptors) if matched.other is not None else None
+    plane = mirror_plane(draft.onto) if matched.other is not None else None
     if plane is None:
         return None
     target = matched.target.mesh
@@ -133,7 +136,7 @@ def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
     here, middle = rest[used].mean(axis=0), there[used].mean(axis=0)
     turn = Rotation.align_vectors(there[used] - middle, rest[used] - here, weights=target.vertex_areas[used])[0]
     start = TriangleMesh(turn.apply(rest - here) + middle, whole.faces)
-    return _in_pose(matched, draft.onto, start, False, "one of opposite sides of something symmetric")
+    return _in_pose(matched, draft.onto, start, False, SIDES)
 
 
 def _in_pose(matched: Alignment, onto: SurfacePoints, start: TriangleMesh, reflected: bool, what: str) -> Hypothesis:

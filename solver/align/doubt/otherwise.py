@@ -7,9 +7,10 @@ from ...surface.mesh import Integers, MeshError
 from ..maps.dense import bent_densely, drafted_from
 from ..maps.mobius_map import challenged, searched
 from ..result.alignment import Alignment
+from ..result.confidence import DOUBTFUL
 from ..surfaces.prepared import Surface
 from .hypotheses import unlike
-from .reconsider import DOUBTFUL, UNLIKE
+from .reconsider import UNLIKE
 
 MOSTLY = 0.6
 """Mean confidence over the whole target, 0 where it has no counterpart, up to which a surface is taken otherwise."""

@@ -21,13 +21,12 @@ from ...stages import Part
 from ...surface.mesh import Booleans, Floats
 from ..maps.dense import begun, bent_densely, drafted_from
 from ..result.alignment import Alignment
+from ..result.confidence import DOUBTFUL
 from ..surfaces.remark import Remark
 from ..surfaces.side_by_side import Work, side_by_side, stages_of
 from .chances import draft_may_reach, may_reach
-from .hypotheses import Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
-
-DOUBTFUL = 0.5
-"""Mean confidence up to which the whole map is doubted aloud."""
+from .hypotheses import SIDES, Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
+from .opposite import with_sides_open
 
 FITS = 0.75
 """Mean confidence from which on a map that is not mirrored is taken as it is.
@@ -130,7 +129,8 @@ def reconsidered(
             chosen.append((each, draft))
     works = [partial(_bent, each, draft) for each, draft in chosen]
     bent = side_by_side(works, clock.within(0.5, 1.0), threads=threads)
-    return _decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
+    decided = _decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
+    return with_sides_open(decided, any(each.what == SIDES for each in hypotheses))
 
 
 _Draft = tuple[Draft, Booleans, Booleans]

@@ -12,10 +12,11 @@ from ...flatten.sphere import Flat
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats, Integers
 from ..result.agreement import trust
-from ..result.alignment import Alignment
+from ..result.alignment import Alignment, Overlap
 from ..result.overlap import piece, shared
 from ..surfaces.remark import Remark
 from .pieces import overlap_of
+from .stretched import agrees_better
 
 PARTIAL = 0.02
 """Share of either surface's area without a counterpart from which on the rest is cut out and aligned anew."""
@@ -70,7 +71,7 @@ def bent_densely(
     """Bend the target onto the source from a first draft; where they show different pieces, what they share."""
     source, target = found.source, found.target
     draft, here, there = first
-    overlap = None
+    cut = None
     if max(left_out(source, target, here, there)) > PARTIAL:
         clock.begin("overlap", "Finding the overlap", 0.2)
         still = clock.within(0.2, 0.2)
@@ -84,7 +85,7 @@ def bent_densely(
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:
                 break
         if max(left_out(source, target, here, there)) > PARTIAL:
-            overlap = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+            cut = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
     remarks = found.remarks
     missing = left_out(source, target, here, there)
     if max(missing) > PARTIAL:
@@ -94,10 +95,22 @@ def bent_densely(
             if share > SETTLED
         )
         remarks += (Remark("partial", f"partial overlap: {apart} without a counterpart on the other surface"),)
-    if overlap is None:
-        clock.begin("bend", "Bending", 0.5)
-        bending = finished(draft, source, target, progress=clock.within(0.5, 1.0))
-        return replace(found, bending=bending, counterpart=there, remarks=remarks)
+    if cut is not None:
+        shared_alone = _of_overlap(found, cut[0], remarks)
+        if cut[1]:
+            return shared_alone
+    share = 0.5 if cut is None else 0.8
+    clock.begin("bend", "Bending", share)
+    bending = finished(draft, source, target, progress=clock.within(share, 1.0))
+    as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
+    if cut is not None and agrees_better(shared_alone, as_wholes):
+        return shared_alone
+    return as_wholes
+
+
+def _of_overlap(found: Alignment, overlap: Overlap, remarks: tuple[Remark, ...]) -> Alignment:
+    """Return the alignment by what two surfaces share alone."""
+    target = found.target
     # what the whole discs left open the pieces may decide
     remarks = tuple(one for one in remarks if one.kind != "rival")
     remarks += tuple(replace(one, before=f"in the overlap: {one.before}") for one in overlap.alignment.remarks)

@@ -4,12 +4,14 @@ from scans import bumps
 from scipy.spatial.transform import Rotation
 from surfaces import planar, rings
 
-from solver import TriangleMesh, prepare
+from solver import AlignSettings, TriangleMesh, align, prepare
+from solver.align.doubt.opposite import with_sides_open
 from solver.align.doubt.own_mirror import mirror_plane
-from solver.surface.nearest import SurfacePoints
+from solver.align.judgement import judge
+from solver.bend.bend import ready
 
 
-def sheet(seed: int) -> TriangleMesh:
+def sheet(seed: int, least: float = -0.45) -> TriangleMesh:
     """A symmetric sheet with hills, of which a strip at one side is missing, turned and moved."""
     disc = bumps(900, seed=1)
     x, y = disc.vertices[:, :2].T
@@ -19,21 +21,22 @@ def sheet(seed: int) -> TriangleMesh:
         height += size * np.exp(-width * ((x - u) ** 2 + (y - v) ** 2))
         height += size * np.exp(-width * ((x + u) ** 2 + (y - v) ** 2))
     points = Rotation.from_rotvec([0.4, -1, 2]).apply(np.column_stack([x, y, height]))
-    return TriangleMesh(points + np.array([3, 1, -2]), disc.faces[(x[disc.faces] > -0.45).all(axis=1)])
+    return TriangleMesh(points + np.array([3, 1, -2]), disc.faces[(x[disc.faces] > least).all(axis=1)])
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_plane_of_a_part_is_found(seed: int):
-    surface = prepare(sheet(seed))
-    mesh = surface.flattening.mesh
-    scale = 1 / np.sqrt(mesh.area)
-    onto = SurfacePoints(TriangleMesh(mesh.vertices * scale, mesh.faces), (), 0.1)
-    plane = mirror_plane(onto, surface.descriptors())
+@pytest.mark.parametrize("least", [-1.0, -0.45, -0.3])
+def test_the_plane_of_a_part_is_found(seed: int, least: float):
+    """Also where little of what is on one side is on the other too."""
+    onto = ready(prepare(sheet(seed, least)).flattening)
+    plane = mirror_plane(onto)
     assert plane is not None
     normal, middle = plane
     turn = Rotation.from_rotvec([0.4, -1, 2])
+    mesh = prepare(sheet(seed, least)).flattening.mesh
+    shift = mesh.vertices[0] / np.sqrt(mesh.area) - onto.mesh.vertices[0]
     assert abs(normal @ turn.apply([1, 0, 0])) > np.cos(np.radians(2))
-    assert abs((middle / scale - [3, 1, -2]) @ turn.apply([1, 0, 0])) < 0.02
+    assert abs(((middle + shift) * np.sqrt(mesh.area) - [3, 1, -2]) @ turn.apply([1, 0, 0])) < 0.02
 
 
 def test_a_screw_has_none():
@@ -41,7 +44,18 @@ def test_a_screw_has_none():
     disc = planar(rings(14)).vertices
     radius, angle = 0.8 + 0.5 * disc[:, 0], 2 * disc[:, 1]
     screw = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.8 * angle])
-    surface = prepare(TriangleMesh(screw, planar(rings(14)).faces))
-    mesh = surface.flattening.mesh
-    onto = SurfacePoints(TriangleMesh(mesh.vertices / np.sqrt(mesh.area), mesh.faces), (), 0.1)
-    assert mirror_plane(onto, surface.descriptors()) is None
+    assert mirror_plane(ready(prepare(TriangleMesh(screw, planar(rings(14)).faces)).flattening)) is None
+
+
+def test_a_sheet_with_hills_anywhere_has_none():
+    assert mirror_plane(ready(prepare(bumps(900, seed=4)).flattening)) is None
+
+
+@pytest.mark.parametrize(("one", "open_"), [(sheet(1, -0.2), True), (bumps(600, seed=4), False)])
+def test_a_mirrored_map_of_what_may_be_sides_is_called_open(one: TriangleMesh, open_: bool):
+    """One half of something symmetric looks like the other in a mirror; anything else that does is mirrored."""
+    other = TriangleMesh(one.vertices * [-1, 1, 1], one.faces[:, ::-1])
+    found = align(one, other, AlignSettings(samples=30, targets=150, refine="mobius"))
+    assert found.mobius.reflected
+    decided = with_sides_open(found, False)
+    assert (judge(decided).level == "check") == open_ == any("opposite sides" in text for text in decided.warnings)
