@@ -111,8 +111,11 @@ def add_modifier(target: bpy.types.Object, source: bpy.types.Object, name: str) 
     Raises
     ------
     Refusal
-        As `type_on`.
+        As `type_on`; or the source follows the target.
     """
+    if any(_is_ours(x) and _input_of(x, "Source") == target for x in source.modifiers):
+        text = rpt_("'{}' follows '{}' already, and both cannot follow each other: remove that modifier first")
+        raise Refusal(text.format(source.name, target.name))
     group = sample_group(SAMPLED[type_on(source, name)])
     title = f"{_PREFIX}'{name}'"
     modifier = target.modifiers.get(title) or target.modifiers.new(title, "NODES")
@@ -125,7 +128,7 @@ def add_modifier(target: bpy.types.Object, source: bpy.types.Object, name: str) 
 
 def remove_live(obj: bpy.types.Object) -> int:
     """Remove the correspondence and the modifiers that use it from an object, and return how many there were."""
-    ours = [x for x in obj.modifiers if x.type == "NODES" and x.node_group and x.node_group.name.startswith(_PREFIX)]
+    ours = [x for x in obj.modifiers if _is_ours(x)]
     names = [name for name in LIVE_NAMES if name in obj.data.attributes]
     for modifier in ours:
         obj.modifiers.remove(modifier)
@@ -142,12 +145,31 @@ def samplable(source: bpy.types.Object) -> list[str]:
 
 def set_input(modifier: Any, label: str, value: Any) -> None:
     """Set an input of a node modifier by its name."""
-    sockets = [item for item in modifier.node_group.interface.items_tree if getattr(item, "in_out", "") == "INPUT"]
-    identifier = next(socket.identifier for socket in sockets if socket.name == label)
+    identifier = _identifier(modifier, label)
     if hasattr(modifier, "properties"):  # from 5.2 on
         getattr(modifier.properties.inputs, identifier).value = value
     else:
         modifier[identifier] = value
+
+
+def _input_of(modifier: Any, label: str) -> Any:
+    """Return an input of a node modifier by its name."""
+    identifier = _identifier(modifier, label)
+    return (
+        getattr(modifier.properties.inputs, identifier).value
+        if hasattr(modifier, "properties")
+        else modifier[identifier]
+    )
+
+
+def _identifier(modifier: Any, label: str) -> str:
+    sockets = [item for item in modifier.node_group.interface.items_tree if getattr(item, "in_out", "") == "INPUT"]
+    return next(socket.identifier for socket in sockets if socket.name == label)
+
+
+def _is_ours(modifier: Any) -> bool:
+    """Return whether a modifier is one that `add_modifier` has added."""
+    return modifier.type == "NODES" and modifier.node_group and modifier.node_group.name.startswith(_PREFIX)
 
 
 def _fill(group: bpy.types.GeometryNodeTree, sampled: Sampled) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,9 @@ class _View:
 
 
 _alone: dict[int, _View] = {}
+
+# editors that were opened beside a viewport; of the session
+_opened: set[int] = set()
 
 
 def space_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
@@ -77,6 +81,22 @@ def show_as_before(context: bpy.types.Context) -> None:
                 _shade(space, before)
     view = context.window_manager.mobius_view
     view.matches = view.discs = view.legend = False
+    _close_opened(context)
+
+
+def close_later(area: bpy.types.Area) -> None:
+    """Have `show_as_before` close an editor that was opened beside a viewport."""
+    _opened.add(area.as_pointer())
+
+
+def _close_opened(context: bpy.types.Context) -> None:
+    """Close the editors of `close_later` that are still what they were, but for one that this is asked in."""
+    for window in context.window_manager.windows:
+        for area in list(window.screen.areas):
+            if area.as_pointer() in _opened and area.ui_type == "UV" and area != context.area:
+                with context.temp_override(window=window, screen=window.screen, area=area), suppress(RuntimeError):
+                    bpy.ops.screen.area_close()  # refused where no neighbour has its side
+    _opened.clear()
 
 
 def _shade(space: bpy.types.SpaceView3D, before: tuple[str, str]) -> None:
@@ -90,6 +110,7 @@ def forget_views() -> None:
     """Forget what viewports showed before: they are gone."""
     _before.clear()
     _alone.clear()
+    _opened.clear()
 
 
 def axes_of(space: bpy.types.SpaceView3D | None) -> Floats:

@@ -35,6 +35,9 @@ def carry_animation(
         for variable in copied.driver.variables:
             for end in variable.targets:
                 _follow(end, variable.type, source, target, names)
+    own = _action(keys)
+    if own is not None and not own.is_editable:  # of another file, which stays linked: `left_behind` says so
+        return
     copies = [(curve, path) for curve in curves_of(given) if (path := _renamed(curve.data_path, names, time))]
     if copies and given != keys and not _same_curves(given, keys):
         bag = _bag(keys)
@@ -127,7 +130,7 @@ def _bag(keys: Any) -> Any:
     action = animated.action
     if action is None:
         animated.action = action = bpy.data.actions.new(f"{keys.name} Action")
-    elif action.users - action.use_fake_user > 1 or not action.is_editable:
+    elif action.users - action.use_fake_user > 1:
         slot = getattr(animated, "action_slot", None)
         animated.action = action = action.copy()
         if slot is not None:

@@ -68,7 +68,8 @@ def require_writable(
 
 def write_report(path: Path, figures: dict[str, Any]) -> None:
     """Write figures as JSON that everyone reads: no NaN, no infinity."""
-    path.write_text(json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    text = json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")  # of a file's name that is no UTF-8
 
 
 def is_input(output: Path, inputs: Iterable[str]) -> bool:

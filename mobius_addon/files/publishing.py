@@ -26,6 +26,12 @@ def real_place(path: Path) -> Path:
 def require_place(path: Path) -> None:
     """Raise `Unreadable` if no file can be written, or replaced, at `path`; see also `require_folder`."""
     place = real_place(path)
+    try:
+        place.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:  # as a name that is too long
+        raise Unreadable(f"'{path}' cannot be written: {error.strerror}") from error
     if place.is_dir():
         raise Unreadable(f"'{path}' is a folder: name a file to write")
     if place.is_symlink() or (place.exists() and not place.is_file()):

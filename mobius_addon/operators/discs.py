@@ -55,4 +55,5 @@ def _split_off(context: bpy.types.Context) -> bpy.types.Area | None:
         return None
     area = added.pop()
     area.ui_type = "UV"
+    viewport.close_later(area)
     return area

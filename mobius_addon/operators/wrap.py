@@ -21,9 +21,9 @@ class MOBIUS_OT_wrap(JobOperator, bpy.types.Operator):
     """Make a new object in the fitted shape; source and target stay as they are."""
 
     bl_idname = "mobius.wrap"
-    bl_label = "Wrap Source onto Target"
+    bl_label = "Fitted Shape"  # of either way: the redo panel bears it
     bl_options = {"REGISTER", "UNDO"}
-    job_title = "Wrap Source onto Target"
+    job_title = "Fitted Shape"
 
     fitted: bpy.props.EnumProperty(
         name="New Object",

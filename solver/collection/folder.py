@@ -166,7 +166,9 @@ def _appending(path: Path) -> TextIO:
 
 def free_name(name: str) -> str:
     """Return a specimen's name as a file may have it on every system."""
-    kept = "".join("_" if sign in '<>:"/\\|?*' or ord(sign) < 32 else sign for sign in name).strip(" .")
+    # of a name that is no UTF-8 Python makes surrogates
+    wrong = [sign in '<>:"/\\|?*' or ord(sign) < 32 or 0xD800 <= ord(sign) < 0xE000 for sign in name]
+    kept = "".join("_" if bad else sign for bad, sign in zip(wrong, name, strict=True)).strip(" .")
     if len(kept.encode()) > LONGEST:
         told_apart = hashlib.sha256(kept.encode()).hexdigest()[:8]
         kept = kept.encode()[: LONGEST - 9].decode(errors="ignore").strip(" .") + "-" + told_apart

@@ -126,3 +126,16 @@ def test_what_cannot_be_followed_is_said(aligned: Any) -> None:
             bpy.ops.mobius.live(attribute=name)
     assert everything(target) == before
     assert not bpy.data.node_groups
+
+
+def test_two_meshes_do_not_follow_each_other(aligned: Any) -> None:
+    source, target, _ = aligned
+    target.vertex_groups.new(name="Own")
+    assert bpy.ops.mobius.live(attribute="Right") == {"FINISHED"}
+    assert bpy.ops.mobius.swap() == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="'Target' follows 'Source' already"):
+        bpy.ops.mobius.live(attribute="Own")
+    assert not source.modifiers
+    assert not [name for name in LIVE_NAMES if name in source.data.attributes]
+    target.modifiers.clear()
+    assert bpy.ops.mobius.live(attribute="Own") == {"FINISHED"}

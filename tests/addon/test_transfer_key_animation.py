@@ -1,5 +1,6 @@
 """What moves the sliders of carried shape keys: drivers that follow the new mesh, and keyframes."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -303,3 +304,23 @@ def test_strips_of_the_nonlinear_animation_are_said() -> None:
         "strips of the nonlinear animation of 'Source' move 'Smile': they are not carried, only the values that they "
         "have now",
     )
+
+
+def test_keyframes_of_another_file_stay_linked_and_it_is_said(two: Any, tmp_path: Path) -> None:
+    source, target = two
+    key(target, "Own", 3)
+    animate(target, "Own", {1: 0.0, 9: 1.0})
+    keys = target.data.shape_keys
+    action = keys.animation_data.action
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {action})
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (stored, wanted):
+        wanted.actions = stored.actions
+    keys.animation_data.action = wanted.actions[0]
+    if hasattr(keys.animation_data, "action_slot"):
+        keys.animation_data.action_slot = wanted.actions[0].slots[0]
+    bpy.data.actions.remove(action)
+    animate(source, "Smile", {1: 0.0, 5: 1.0})
+    said = carry(source, target, "shape-keys").warnings
+    assert any("linked from another file" in text for text in said)
+    assert keys.animation_data.action == wanted.actions[0]
+    assert evaluated(target, "Own", [9]) == [1.0]

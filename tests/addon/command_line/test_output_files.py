@@ -1,6 +1,7 @@
 """What a command puts into a folder: all of it or nothing, and nothing of anyone else's is touched."""
 
 import fcntl
+import json
 import os
 import shutil
 import signal
@@ -18,6 +19,7 @@ from scenes import make_sheet
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
 from mobius_extension.mobius_addon import files  # noqa: E402
+from mobius_extension.mobius_addon.command_line.output_files import write_report  # noqa: E402
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -119,6 +121,17 @@ def test_endings_may_be_large(ending: str, tmp_path: Path, capsys: pytest.Captur
     assert {x.suffix for x in tmp_path.glob("OUT*")} <= {ending.upper(), ".mtl", ".bin", ".fbm"}
     assert run(capsys, "check", out)[0] == 0
     assert run(capsys, "check", f"{out}:Sheet")[0] in (0, 2)  # some files do not keep the object's name
+
+
+def test_a_report_of_a_name_that_is_no_utf_8_is_json(tmp_path: Path) -> None:
+    name = b"na\xefve.obj".decode(errors="surrogateescape")
+    write_report(tmp_path / "report.json", {"source": name})
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == {"source": name}
+
+
+def test_a_name_that_is_too_long_is_refused_before_the_work(tmp_path: Path) -> None:
+    with pytest.raises(files.Unreadable, match="cannot be written: File name too long"):
+        files.require_place(tmp_path / ("x" * 300 + ".ply"))
 
 
 def test_a_link_is_followed_and_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

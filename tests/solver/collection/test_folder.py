@@ -53,6 +53,7 @@ def test_a_damaged_line_is_no_line(tmp_path: Path) -> None:
 
 def test_a_long_name_is_cut_and_told_apart() -> None:
     assert free_name('a<b>:"c"') == "a_b___c_"
+    assert free_name(b"na\xefve".decode(errors="surrogateescape")) == "na_ve"
     long = ["歯" * 80 + end for end in "ab"]
     cut = [free_name(name) for name in long]
     assert cut[0] != cut[1]
