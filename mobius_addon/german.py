@@ -10,7 +10,7 @@ GERMAN = {
     "'{}' is disabled in viewports, or its collection is hidden: show it in the Outliner to see them": "„{}“ ist in Ansichten deaktiviert oder dessen Sammlung verborgen: Im Outliner zeigen, um sie zu sehen",
     "'{}' is in no collection of this view layer: include its collection in the Outliner to see them": "„{}“ ist in keiner Sammlung dieser Ansichtsebene: Dessen Sammlung im Outliner aufnehmen, um sie zu sehen",
     "'{}' is in {} Mode: switch to Object Mode first": "„{}“ ist im {}-Modus: Zuerst in den Objektmodus wechseln",
-    "'{}' is linked from another file: make it local first (Object > Relations > Make Local)": "„{}“ ist aus einer anderen Datei verknüpft: Zuerst lokal machen (Objekt > Beziehungen > Lokal machen)",
+    "'{}' is linked from another file: make it local first (Object > Relations > Make Local > Selected Objects and Data)": "„{}“ ist aus einer anderen Datei verknüpft: Zuerst lokal machen (Objekt > Beziehungen > Lokal machen > Ausgewählte Objekte und Daten)",
     "'{}' is no mesh: convert it (Object > Convert > Mesh) or choose another {}": "„{}“ ist kein Mesh: Umwandeln (Objekt > Konvertieren > Mesh) oder ein anderes {} wählen",
     "'{}' is not in this scene: choose another {}": "„{}“ ist nicht in dieser Szene: Ein anderes {} wählen",
     "'{}' keeps an alignment that is damaged: press Align again": "Die Ausrichtung in „{}“ ist beschädigt: Nochmals auf Ausrichten drücken",

@@ -58,8 +58,12 @@ def why_not_written(obj: bpy.types.Object) -> str | None:
     """Return why a mesh object of any scene cannot be changed, or None if it can."""
     if reason := _why_not_read(obj):
         return reason
-    if not (obj.is_editable and obj.data.is_editable):
-        text = rpt_("'{}' is linked from another file: make it local first (Object > Relations > Make Local)")
+    # of an overridden mesh Blender keeps no layer when the file is saved, though all can be written
+    if not (obj.is_editable and obj.data.is_editable) or obj.data.override_library is not None:
+        text = rpt_(
+            "'{}' is linked from another file: make it local first "
+            "(Object > Relations > Make Local > Selected Objects and Data)"
+        )
         return text.format(obj.name)
     return None
 

@@ -125,7 +125,7 @@ class SphereMobius:
     def __post_init__(self) -> None:
         h, q = tuple(float(a) for a in self.h), tuple(float(a) for a in self.rotation)
         fits = len(h) == 3 and len(q) == 4 and all(math.isfinite(a) for a in (*h, *q))
-        if not (fits and math.hypot(*h) < 1 and math.hypot(*q) > 1e-100):
+        if not (fits and math.hypot(*h) < 1 and 1e-100 < math.hypot(*q) < math.inf):
             raise ValueError(
                 f"a Möbius transformation of the sphere needs |h| < 1 and a quaternion other than 0, not h={self.h}, "
                 f"rotation={self.rotation}"

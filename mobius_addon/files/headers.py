@@ -16,6 +16,7 @@ from typing import IO
 import numpy as np
 
 from . import blend_header, fbx_header, gltf_header, ply_header
+from .nowhere import are_places, is_nowhere, may_be_nowhere
 from .unreadable import Unreadable, cut_short, no_numbers
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
@@ -46,7 +47,7 @@ def _check_stl(path: Path) -> None:
     need = 84 + 50 * count
     if size >= 84 and need == size:
         corners = np.frombuffer(content, _TRIANGLE, count, 84)["corners"]
-        if (wrong := np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))).size:
+        if (wrong := np.flatnonzero(~are_places(corners).all(axis=(1, 2)))).size:
             raise no_numbers(path, wrong.size, f"in triangle {wrong[0]:,}")
     elif content[:80].lstrip()[:5].lower() == b"solid" and b"\0" not in content[:4096]:
         if b"endsolid" not in content[-4096:].lower():
@@ -66,11 +67,11 @@ def _check_obj(path: Path) -> None:
 
 
 def _require_numbers(path: Path, content: bytes, keyword: bytes) -> None:
-    """Raise `Unreadable` if a line that begins with a keyword has nan or inf in it."""
-    small = content.lower()
-    if b"nan" not in small and b"inf" not in small:  # as nearly always, and found in no time
+    """Raise `Unreadable` if a line that begins with a keyword has a coordinate that is no place."""
+    if not may_be_nowhere(content):
         return
-    wrong = list(re.finditer(rb"(?im)^[ \t]*" + keyword + rb"[ \t][^\r\n#]*(?:nan|inf)", content))
+    lines = re.finditer(rb"(?im)^[ \t]*" + keyword + rb"[ \t]([^\r\n#]*)", content)
+    wrong = [line for line in lines if any(map(is_nowhere, line[1].split()[:3]))]
     if wrong:
         line = content.count(b"\n", 0, wrong[0].start()) + 1
         raise no_numbers(path, len(wrong), f"on line {line:,}")

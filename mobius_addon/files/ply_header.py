@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...solver.surface.mesh import Integers
+from .nowhere import are_places, is_nowhere, may_be_nowhere
 from .unreadable import Unreadable, cut_short, no_numbers
 
 _LETTERS = {
@@ -117,7 +118,7 @@ def _nowhere_in_binary(body: bytes, order: str, elements: list[_Element]) -> lis
     there = np.ones(element.count, bool)
     for name in form.names or ():
         if name.split()[0] in _AXES:
-            there &= np.isfinite(rows[name])
+            there &= are_places(rows[name])
     return np.flatnonzero(~there).tolist()
 
 
@@ -125,13 +126,12 @@ def _nowhere_in_text(body: bytes, _order: str, elements: list[_Element]) -> list
     """Return the vertices whose coordinates are no numbers, if they come first."""
     element = elements[0]
     columns = [k for k, (name, _, _) in enumerate(element.properties) if name in _AXES]
-    small = body.lower()
-    if element.name != "vertex" or (b"nan" not in small and b"inf" not in small):
+    if element.name != "vertex" or not may_be_nowhere(body):
         return []
     return [
         k
         for k, line in enumerate(body.splitlines()[: element.count])
-        if any(re.search(rb"(?i)nan|inf", word) for j, word in enumerate(line.split()) if j in columns)
+        if any(is_nowhere(word) for j, word in enumerate(line.split()) if j in columns)
     ]
 
 

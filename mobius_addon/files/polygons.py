@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...solver.surface.mesh import Floats, Integers
+from .nowhere import are_places
 from .unreadable import Unreadable, no_numbers
 
 
@@ -41,7 +42,7 @@ def put_into_scene(polygons: Polygons, path: Path) -> bpy.types.Mesh:
         A polygon has a vertex that is not there, or a vertex is at no place.
     """
     # Blender would take them for 0
-    if (wrong := np.flatnonzero(~np.isfinite(polygons.vertices).all(axis=1))).size:
+    if (wrong := np.flatnonzero(~are_places(polygons.vertices).all(axis=1))).size:
         raise no_numbers(path, wrong.size, f"vertex {wrong[0]:,}")
     count = len(polygons.vertices)
     outside = (polygons.corners < 0) | (polygons.corners >= count)

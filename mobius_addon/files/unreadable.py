@@ -19,6 +19,8 @@ def cut_short(path: Path, asked: str, needed: int, held: int) -> Unreadable:
 
 
 def no_numbers(path: Path, count: int, first: str) -> Unreadable:
-    """Return the error of a file with points whose coordinates are nan or infinite; `first` says where one is."""
+    """Return the error of a file with points whose coordinates are no places; `first` says where one is."""
     points = "a point" if count == 1 else f"{count:,} points"
-    return Unreadable(f"'{path}' is damaged: the coordinates of {points} are no numbers; the first is {first}")
+    return Unreadable(
+        f"'{path}' is damaged: the coordinates of {points} are no numbers that Blender can hold; the first is {first}"
+    )

@@ -75,11 +75,9 @@ class MOBIUS_OT_check(bpy.types.Operator):
                 said = iface_(topology_cache.HELD[badly.kind]) if badly else ""
             except MeshError as error:
                 said = told(str(error))
-            if said:
-                self.report({"WARNING"}, f"{line}; {said}")
-                return {"FINISHED"}
+            line = f"{line}; {said}" if said else line
             if not whole.repairs:
-                self.report({"INFO"}, line)
+                self.report({"WARNING" if said else "INFO"}, line)
                 return {"FINISHED"}
         trouble = troubled_vertices(mesh, found)
         if self.select and trouble.any() and obj.data.is_editable:

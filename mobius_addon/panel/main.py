@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import topology_cache
+from .. import stored_alignment, topology_cache
 from ..job import Job, describe_left, describe_proof
 from ..jobs import MOBIUS_OT_stop
 from ..operators.align import MOBIUS_OT_align
@@ -88,7 +88,9 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if others := selected_with(context, role):
         text = iface_("Join a Copy of {:,} Selected").format(len(others) + 1)
         column.operator(MOBIUS_OT_join_copy.bl_idname, text=text, icon="AUTOMERGE_ON", translate=False).role = role
-    if role == "target" and (reason := why_not_written(obj)):
+    # what is aligned may be read from another file, but not aligned there
+    gives = role == "source" and settings.target is not None and stored_alignment.exists(settings.target, obj)
+    if not gives and (reason := why_not_written(obj)):
         draw_sentence(column, context, reason, "LOCKED")
 
 

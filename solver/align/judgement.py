@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 
 from .diagnosis import CROPPED
-from .doubt.reconsider import DOUBTFUL, FITS
+from .doubt.reconsider import FITS
 from .result.alignment import Alignment
-from .result.confidence import MATCHED
+from .result.confidence import DOUBTFUL, MATCHED
 from .surfaces.remark import Kind, Remark
 
 Level = Literal["good", "check", "doubtful"]

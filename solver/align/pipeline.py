@@ -14,12 +14,12 @@ from .diagnosis import causes, coarse, deep
 from .doubt.inside_out import turned_round
 from .doubt.other_rim import with_other_rim
 from .doubt.own_motion import with_motions_open
-from .doubt.reconsider import DOUBTFUL, FITS, reconsidered
+from .doubt.reconsider import FITS, reconsidered
 from .maps.dense import bent_densely, drafted_from
 from .maps.mobius_map import roughly_aligned
 from .parts.completing import completed
 from .result.alignment import Alignment
-from .result.confidence import BOUND
+from .result.confidence import BOUND, DOUBTFUL
 from .surfaces.landmarks import own_landmarks
 from .surfaces.lips import with_lips_joined
 from .surfaces.main_parts import other_mains

@@ -26,7 +26,7 @@ from .coarse import Coarse, coarse
 from .least_moved import unfolded
 from .noise import shortest
 from .plate import NORMAL_WEIGHT, SOLVER_STEPS, TENSION, relaxed
-from .pose import ROUGHLY_BY, in_pose, misfit, rigidly, settled
+from .pose import ASKED, FEW, MOST, ROUGHLY_BY, in_pose, misfit, rigidly, settled
 from .rotations import NEAR_BEND_LENGTH, coarsely_bent, turned_like
 from .unfold_sphere import injective_on_sphere
 
@@ -90,6 +90,8 @@ class Draft:
         The nodes in the source's pose, and bent.
     count : int
         How many nodes were asked for.
+    way : int or None
+        Which way of beginning was taken, of `_best_start`; None where it began at given places.
     """
 
     onto: SurfacePoints
@@ -102,6 +104,7 @@ class Draft:
     rest: Floats
     now: Floats
     count: int
+    way: int | None
 
     def places(self) -> Floats:
         """Return where all target vertices are, (n, 3), in the frame of `onto`; 0 at vertices in no face."""
@@ -130,6 +133,7 @@ def drafted(
     count: int = NODES,
     progress: Callable[[float], None] | None = None,
     like: Draft | None = None,
+    way: int | None = None,
 ) -> Draft:
     """Bend the target onto the source with a stiff plate, beginning at the Möbius map.
 
@@ -156,6 +160,8 @@ def drafted(
         Called with the share of the work done, in [0, 1]; may raise to end it.
     like : Draft, optional
         Another draft of the same surfaces, from whatever map: what does not depend on that is taken from it.
+    way : int, optional
+        `Draft.way` of a draft of the same map by another number of nodes: no other way of beginning is tried.
     """
     tell = progress or (lambda _: None)
     onto = ready(source) if like is None else like.onto
@@ -176,14 +182,16 @@ def drafted(
     growth = _growth(TriangleMesh(whole.vertices[nodes], faces), places, believed)
     flat = TriangleMesh(whole.vertices[nodes] * growth, faces)
     if start is None:
-        flat, rest, growth = _best_start(flat, growth, places, believed, 1 / np.sqrt(whole.area), onto)
+        same_area = 1 / np.sqrt(whole.area)
+        flat, rest, growth, way = _best_start(flat, growth, places, believed, same_area, onto, count < NODES, way)
     else:
+        way = None
         rest = settled(TriangleMesh(turned_like(flat, places, believed, NEAR_BEND_LENGTH), faces), onto)
     unbent = whole.vertices * growth
     tell(0.0)
     lengths = _lengths(STIFFEST, SOFTEST, ROUNDS)[:rounds]
     now = relaxed(rest, rest, faces, onto, lengths, np.zeros(len(nodes), bool), tell)
-    return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now, count)
+    return Draft(onto, whole, conformal, growth, unbent, few, flat, rest, now, count, way)
 
 
 def ready(source: Flat) -> SurfacePoints:
@@ -202,25 +210,34 @@ def facing(mesh: TriangleMesh, reflected: bool) -> tuple[TriangleMesh, list[int]
 
 
 def _best_start(
-    flat: TriangleMesh, growth: float, places: Floats, trust: Floats, same_area: float, onto: SurfacePoints
-) -> tuple[TriangleMesh, Floats, float]:
-    """Return the nodes at rest, (q, 3) both unbent and as the bending begins, and their scale.
+    flat: TriangleMesh,
+    growth: float,
+    places: Floats,
+    trust: Floats,
+    same_area: float,
+    onto: SurfacePoints,
+    few: bool,
+    known: int | None,
+) -> tuple[TriangleMesh, Floats, float, int]:
+    """Return the nodes at rest, (q, 3) both unbent and as the bending begins, their scale, and which way that is.
 
     Bent as their Möbius images, (q, 3), are, or in one rigid pose with most of these: what is hardly bent is better off
     unbent, above all where the images err. In the images' scale, `growth`, or in that in which the areas are the same.
-    The one is taken that lies on the source best (`misfit`).
+    The one is taken that lies on the source best (`misfit`), if it is not `known`. Where there are `few`
+    nodes few points are asked.
     """
     best, least = None, np.inf
-    for scale in (growth, same_area):
+    for way in range(4) if known is None else (known,):
+        scale = (growth, same_area)[way // 2]
         scaled = TriangleMesh(flat.vertices * (scale / growth), flat.faces)
-        for way in (coarsely_bent(scaled, places, trust), rigidly(scaled, places, trust)):
-            rest = in_pose(TriangleMesh(way, flat.faces), onto, most=ROUGHLY_BY)
-            apart = misfit(TriangleMesh(rest, flat.faces), onto)
-            if best is None or apart < least:
-                best, least = (scaled, rest, scale), apart
+        there = (coarsely_bent, rigidly)[way % 2](scaled, places, trust)
+        rest = in_pose(TriangleMesh(there, flat.faces), onto, most=FEW if few else ROUGHLY_BY)
+        apart = 0.0 if known is not None else misfit(TriangleMesh(rest, flat.faces), onto, ASKED if few else MOST)
+        if best is None or apart < least:
+            best, least = (scaled, rest, scale, way), apart
     assert best is not None
-    scaled, rest, scale = best
-    return scaled, in_pose(TriangleMesh(rest, flat.faces), onto), scale
+    scaled, rest, scale, way = best
+    return scaled, in_pose(TriangleMesh(rest, flat.faces), onto), scale, way
 
 
 def finished(

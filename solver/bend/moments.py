@@ -9,44 +9,43 @@ from __future__ import annotations
 from itertools import permutations, product
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
-from .pose import in_pose, misfit
+from .pose import ASKED, FEW, MOST, in_poses, misfits
 
-FEW, FEW_ROUNDS = 100, 5
-"""Vertices, about, and closest point rounds by which the poses are compared.
-
-On 12 pairs, mirrored and not, the best one was the same by three times as many vertices wherever it lay well.
-"""
-
-ASKED = 400
-"""Vertices of either surface that say how well a pose lies, where poses are compared."""
+FEW_ROUNDS = 5
+"""Closest point rounds by which the poses are compared."""
 
 KEPT = 3
 """Poses that are improved until they settle."""
 
 
-def posed(mesh: TriangleMesh, onto: SurfacePoints) -> tuple[Floats, float]:
+def posed(mesh: TriangleMesh, onto: SurfacePoints, roughly: SurfacePoints) -> tuple[Floats, float]:
     """Return the vertices, (n, 3), of a surface in the rigid pose that lies best on another, and its `misfit`.
 
     Of the 24 turns that lay axes along axes, since those of nearly equal moments may be exchanged, each improved by
-    closest points (`in_pose`). The mesh has the other's scale, and orientation, already.
+    closest points (`in_poses`). The mesh has the other's scale, and orientation, already; `roughly` is the other by few
+    vertices, on which poses are compared: most lie far off, where a tree of many points takes long to answer.
     """
     middle, axes = _moments(mesh)
     other, other_axes = _moments(onto.mesh)
-    tried = []
-    for turn in _turns():
-        x = (mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other
-        x = in_pose(TriangleMesh(x, mesh.faces), onto, FEW_ROUNDS, FEW)
-        tried.append((misfit(TriangleMesh(x, mesh.faces), onto, ASKED), x))
-    best, least = tried[0][1], np.inf
-    for _, x in sorted(tried, key=lambda pair: pair[0])[:KEPT]:
-        settled = in_pose(TriangleMesh(x, mesh.faces), onto)
-        apart = misfit(TriangleMesh(settled, mesh.faces), onto)
-        if apart < least:
-            best, least = settled, apart
-    return best, least
+    starts = np.stack([(mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other for turn in _turns()])
+    tried = in_poses(mesh, starts, roughly, FEW_ROUNDS, FEW)
+    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in tried], roughly, ASKED)
+    kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], roughly, most=FEW)
+    kept = in_poses(mesh, kept, onto)
+    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in kept], onto, MOST)
+    best = int(np.argmin(apart))
+    return kept[best], float(apart[best])
+
+
+def _rigid(one: Floats, two: Floats) -> tuple[Floats, Floats]:
+    """Return the rotation, (3, 3), and the shift, (3,), after it that carry points to others in another pose."""
+    here, there = one.mean(axis=0), two.mean(axis=0)
+    turn = Rotation.align_vectors(two - there, one - here)[0].as_matrix()
+    return turn, there - turn @ here
 
 
 def _moments(mesh: TriangleMesh) -> tuple[Floats, Floats]:

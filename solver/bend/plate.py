@@ -73,12 +73,17 @@ def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn:
 
 
 def planes(x: Floats, own: Floats, areas: Floats, onto: SurfacePoints) -> tuple[Floats, Floats, Floats]:
-    """Return how strongly, (n,), vertices with normals `own` are drawn to which planes: normals, (n, 3), distances."""
-    point, normal, beyond = onto.at(*onto.most_alike(x, own))
-    weight = np.where(beyond, 0.0, np.clip((own * normal).sum(axis=1), 0, 1) ** 2) * areas
-    distance = ((point - x) * normal).sum(axis=1)
-    deviation = np.sqrt(weight @ distance**2 / max(float(weight.sum()), 1e-12))
-    return weight / (1 + (distance / max(OUTLIER * deviation, 1e-6)) ** 2), normal, distance
+    """Return how strongly, (..., n), vertices, (..., n, 3), with normals `own` are drawn to which planes.
+
+    Then the planes' normals, (..., n, 3), and distances, (..., n). What is usual is asked of each n by themselves.
+    """
+    point, normal, beyond = onto.at(*onto.most_alike(x.reshape(-1, 3), own.reshape(-1, 3)))
+    point, normal, beyond = point.reshape(x.shape), normal.reshape(x.shape), beyond.reshape(x.shape[:-1])
+    weight = np.where(beyond, 0.0, np.clip((own * normal).sum(axis=-1), 0, 1) ** 2) * areas
+    distance = ((point - x) * normal).sum(axis=-1)
+    square = (weight[..., None, :] @ (distance**2)[..., None])[..., 0]
+    deviation = np.sqrt(square / np.maximum(weight.sum(axis=-1, keepdims=True), 1e-12))
+    return weight / (1 + (distance / np.maximum(OUTLIER * deviation, 1e-6)) ** 2), normal, distance
 
 
 def relaxed(

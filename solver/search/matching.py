@@ -232,7 +232,8 @@ class Matching:
         for pair, point, target, distance in self._hits(mobius, check):
             if len(pair) == 0:
                 continue
-            weight, apart = self.weights_of(pair), distance / self.radii[target]
+            # next to the circle a radius may come out as 0
+            weight, apart = self.weights_of(pair), distance / np.maximum(self.radii[target], np.finfo(float).tiny)
             first = np.flatnonzero(np.diff(point, prepend=-1))
             length = np.diff(np.append(first, len(point)))
             heaviest = np.maximum.reduceat(weight, first)
@@ -283,7 +284,7 @@ def matching(
         given = Discs(b, e, True)
         centre, e = hyperbolic_disc(b, e)
     elif metric == "euclidean":
-        centre = b
+        centre, e = b, np.minimum(e, 3)  # no two points of the disc are farther apart
     else:
         raise ValueError(f"unknown metric '{metric}': use 'hyperbolic' or 'euclidean'")
     rows, unit = (None, 1.0) if weights is None else rows_of(np.asarray(weights), (len(m), len(b)), check)

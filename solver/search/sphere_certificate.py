@@ -51,11 +51,14 @@ def certify_sphere(
         small cases.
     most_boxes : int
         Give up beyond this many boxes.
+
+    Raises
+    ------
+    ValueError
+        The input is none that can be searched: wrong shapes, anything not finite or out of range; the text names which.
+        What is wrong with the claim itself is among the `objections`.
     """
-    m, b = (np.asarray(x, np.float64) for x in (source, target))
-    m, b = (x / np.linalg.norm(x, axis=1)[:, None] for x in (m, b))
-    rho = np.broadcast_to(np.asarray(radius, np.float64), (len(b),))
-    table = np.ones((len(m), len(b))) if weights is None else np.asarray(weights, np.float64)
+    m, b, rho, table = _checked(source, target, radius, weights, h_max)
     rounding = 0.0 if ((table == 0) | (table == 1)).all() else len(m) * max(2.0**-21, len(m) * 2.0**-31)
     reached = _value(mobius, m, b, rho, table)
     objections = []
@@ -80,6 +83,32 @@ def certify_sphere(
             count = _cover(m * [1, sign, 1], b, rho, table, upper_bound + rounding, h_max, most_boxes - boxes)
             bounded, boxes = bounded and count is not None, boxes + (count or most_boxes)
     return Certificate(reached, reached, inside and holds, bounded, boxes, tuple(objections))
+
+
+def _checked(
+    source: npt.ArrayLike, target: npt.ArrayLike, radius: npt.ArrayLike, weights: npt.ArrayLike | None, h_max: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return points, radii and weights, or raise ValueError: by the rules of the search, and by other code."""
+    if not 0 <= h_max < 1:  # nan is neither
+        raise ValueError(f"h_max must be 0 or more and below 1, not {h_max}")
+    m, b = (np.asarray(x, np.float64) for x in (source, target))
+    for name, points in (("source", m), ("target", b)):
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+            raise ValueError(f"the {name} must be points of shape (n, 3), not {points.shape}")
+        if not (np.abs(np.linalg.norm(points, axis=1) - 1) <= 1e-9).all():
+            raise ValueError(f"the {name} must be finite points of the unit sphere")
+    m, b = (x / np.linalg.norm(x, axis=1)[:, None] for x in (m, b))
+    rho = np.asarray(radius, np.float64)
+    if rho.shape not in ((), (len(b),)):
+        raise ValueError(f"radius must be one number or one per target point, not of shape {rho.shape}")
+    if not ((rho > 0) & (rho <= 2)).all():
+        raise ValueError("every radius must be a chord of the unit sphere, above 0 and at most 2")
+    table = np.ones((len(m), len(b))) if weights is None else np.asarray(weights, np.float64)
+    if table.shape != (len(m), len(b)):
+        raise ValueError(f"weights must be of shape {(len(m), len(b))}, not {table.shape}")
+    if not ((table >= 0) & (table <= 1)).all():
+        raise ValueError("every weight must lie in [0, 1]")
+    return m, b, np.broadcast_to(rho, (len(b),)), table
 
 
 def _value(mobius: SphereMobius, m: Floats, b: Floats, rho: Floats, table: Floats) -> float:

@@ -16,6 +16,10 @@ from .mesh import Booleans, Floats, Integers, TriangleMesh, first_corners
 SUITABLE = 2
 """Samples around whose faces `SurfacePoints.most_alike` looks."""
 
+LEAF = 20
+"""Samples in each leaf of a tree: beside scipy's 10, queries take as long near the surface and a quarter less 0.06 of
+the root of its area away (1,500 of them on a hand)."""
+
 AT_ONCE = 4096
 """Queries that are answered together: enough for numpy, few enough to stay in the processor's cache."""
 
@@ -66,7 +70,7 @@ class SurfacePoints:
         centres = features[self.mesh.faces].mean(axis=1)
         length = np.linalg.norm(centres[:, 3:], axis=1, keepdims=True)
         centres[:, 3:] *= self.normal_weight / np.maximum(length, np.finfo(float).tiny)
-        return KDTree(np.concatenate([features[used], centres])), np.concatenate(
+        return KDTree(np.concatenate([features[used], centres]), LEAF), np.concatenate(
             [first // 3, np.arange(len(self.mesh.faces))]
         )
 

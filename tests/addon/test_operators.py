@@ -288,6 +288,27 @@ def test_linked_meshes_are_only_read(tmp_path: Any) -> None:
     assert bpy.ops.mobius.check() == {"FINISHED"}
 
 
+def test_an_overridden_mesh_whose_layers_blender_drops_on_saving_is_refused(tmp_path: Any) -> None:
+    make_sheet("Sheet", 8)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Sheet"]
+    linked = wanted.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    own = linked.override_create(remap_local_usages=True)
+    own.data.override_create(remap_local_usages=True)
+    assert own.data.is_editable
+    scene = bpy.context.scene
+    scene.mobius.source, scene.mobius.target = make_sheet("Source", 8), own
+    with pytest.raises(RuntimeError, match=r"'Sheet' is linked .* Make Local > Selected Objects and Data"):
+        bpy.ops.mobius.align(**QUICK)
+    activate(own)
+    own.select_set(True)
+    bpy.ops.object.make_local(type="SELECT_OBDATA")
+    assert why_not(bpy.context.object, "mesh", scene) is None
+
+
 # transfer
 
 

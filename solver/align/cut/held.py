@@ -35,10 +35,12 @@ def held(tidy: Cleaned, *, fill_holes: bool = True) -> Held | None:
     Raises
     ------
     MeshError
-        No disc holds it, and no piece of it hangs by a neck where it could be cut; the text says what to do.
+        No disc holds it, and no piece of it hangs by a neck where it could be cut; or too few vertices are inside its
+        boundary. The text says what to do.
     """
+    surface = Surface(tidy.mesh, fill_holes=fill_holes, tidy=tidy)
     try:
-        found = Surface(tidy.mesh, fill_holes=fill_holes, tidy=tidy).flattening
+        found = surface.flattening
     except MeshError:
         if not necks(tidy.mesh):
             raise
@@ -47,6 +49,7 @@ def held(tidy: Cleaned, *, fill_holes: bool = True) -> Held | None:
                 "too deep", "juts out too far for a sphere: beside an open surface a piece that fits it is cut out"
             )
         return Held("too deep", "too deep for one disc: a piece that fits the other surface is cut out, if it has one")
+    surface.require_inside()
     if found.domain.closed:
         return None
     if found.rim_lost > LITTLE:

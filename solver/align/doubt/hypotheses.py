@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,13 +13,16 @@ from ...bend.bend import Draft, facing
 from ...bend.coarse import coarse
 from ...bend.moments import posed
 from ...bend.pose import FAR, misfit
+from ...flatten.sphere import Flat
 from ...search.outcome import SearchResult
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats, TriangleMesh
 from ...surface.nearest import SurfacePoints
+from ...surface.topology import topology
 from ..maps.mobius_map import implied, improved, rival_of, taking, unproved, valued
 from ..result.agreement import descriptor_distance
 from ..result.alignment import Alignment
+from ..result.overlap import shared_nodes
 from .own_mirror import mirror_plane, mirrored
 
 POSE_NODES = 300
@@ -27,6 +30,10 @@ POSE_NODES = 300
 
 SIDES = "one of opposite sides of something symmetric"
 """What `by_own_mirror` leads to."""
+
+ROUGH_NODES = 1000
+"""Vertices of the source, about, by which poses are compared: on 14 hands, feet, ears, heads and teeth the pose is the
+same by all of them, in half the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +64,20 @@ def _other_side(matched: Alignment, other: SearchResult) -> Alignment:
     return replace(matched, search=other, other=matched.search, rival=None, remarks=tuple(unproved(other)))
 
 
-def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]:
-    """Yield so many further maxima of a search, each far from those before, as some thousand cells show them."""
+def further(matched: Alignment, count: int, worth: Callable[[float], bool], clock: Part) -> Iterator[Hypothesis]:
+    """Yield so many further maxima of a search, each far from those before, as some thousand cells show them.
+
+    As long as they are `worth` it by the samples that match.
+    """
     known: list[Any] = [matched.search.mobius]
+    if matched.rival is not None and not worth(matched.rival.upper_bound):
+        return
     for number in range(count):
         part = clock.part(number / count, (number + 1) / count)
         part.begin("reconsider", "Trying another map", 0.0)
         rival = rival_of(matched, known, 0.0, part)
+        if not worth(rival.value):
+            return
         known.append(rival.mobius)
         behind = 100 * (matched.search.value - rival.value) / len(matched.source_samples)
         yield Hypothesis(
@@ -71,8 +85,10 @@ def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]
         )
 
 
-def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
+def by_pose(matched: Alignment, onto: SurfacePoints, known: Callable[[Floats], bool]) -> Hypothesis | None:
     """Return what the rigid pose leads to in which the target lies best on the source, mirrored or not if both may be.
+
+    None if it is `known` where that puts the target's vertices, (n, 3).
 
     Parameters
     ----------
@@ -81,18 +97,28 @@ def by_pose(matched: Alignment, onto: SurfacePoints) -> Hypothesis:
         As of `Draft`.
     """
     target = matched.target
+    roughly = _by_few(matched.source, onto)
     sides = [matched.mobius.reflected] if matched.other is None else [False, True]
     poses = []
     for reflected in sides:
         whole, order = facing(target.mesh, reflected)
         all_vertices = whole.vertices / np.sqrt(whole.area)
         few = coarse(target, POSE_NODES, order)
-        x, apart = posed(TriangleMesh(all_vertices[few.nodes], few.faces), onto)
+        x, apart = posed(TriangleMesh(all_vertices[few.nodes], few.faces), onto, roughly)
         here, there = all_vertices[few.nodes].mean(axis=0), x.mean(axis=0)
         turn = Rotation.align_vectors(x - there, all_vertices[few.nodes] - here)[0]
         poses.append((apart, reflected, turn.apply(all_vertices - here) + there, whole.faces))
     _, reflected, start, faces = min(poses, key=lambda pose: pose[:2])
+    if known(start):
+        return None
     return _in_pose(matched, onto, TriangleMesh(start, faces), reflected, "one that a rigid pose implies")
+
+
+def _by_few(source: Flat, onto: SurfacePoints) -> SurfacePoints:
+    """Return the source, ready for what is bent onto it, by `ROUGH_NODES` of its vertices."""
+    few = coarse(source, ROUGH_NODES, [0, 1, 2])
+    mesh = TriangleMesh(onto.mesh.vertices[few.nodes], few.faces)
+    return SurfacePoints(mesh, topology(mesh).boundary_loops, onto.normal_weight)
 
 
 def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
@@ -142,6 +168,19 @@ def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
         found.source, found.source_descriptors, found.target_descriptors[used], face[used], barycentric[used]
     )
     areas = found.target.mesh.vertex_areas[used]
+    return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
+
+
+def roughly_unlike(found: Alignment, draft: Draft) -> float:
+    """Return the same by the nodes of the draft alone."""
+    some = shared_nodes(draft, found.source, found.target)
+    if not some.any():
+        return np.inf
+    nodes = TriangleMesh(draft.now, draft.flat.faces)
+    face, barycentric = draft.onto.nearest_point(draft.now[some], nodes.vertex_normals()[some])
+    there = found.target_descriptors[draft.few.nodes[some]]
+    distance = descriptor_distance(found.source, found.source_descriptors, there, face, barycentric)
+    areas = draft.flat.vertex_areas[some]
     return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...bend.bend import facing, ready
-from ...bend.pose import POSE_SETTLED
+from ...bend.pose import HELD, POSE_SETTLED
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.sampling import spread
 from ..result.agreement import descriptor_distance
@@ -192,9 +192,8 @@ def _settled(own: OwnFit, points: Floats, normals: Floats, turn: Floats, shift: 
         arm = x - x.mean(axis=0)
         moves = np.concatenate([up, np.cross(arm, up)], axis=1)
         # held a little, so that what slides freely stays
-        step = np.linalg.solve(
-            moves.T @ moves + 0.01 * len(x) * np.eye(6), (up * (other[lies] - x)).sum(axis=1) @ moves
-        )
+        held = HELD * len(x) * np.eye(6)
+        step = np.linalg.solve(moves.T @ moves + held, (up * (other[lies] - x)).sum(axis=1) @ moves)
         more = Rotation.from_rotvec(step[3:]).as_matrix()
         shift = (shift - x.mean(axis=0)) @ more.T + x.mean(axis=0) + step[:3]
         turn = more @ turn

@@ -11,22 +11,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import chain
+from typing import TypeVar
 
 import numpy as np
 
-from ...bend.bend import NODES, Draft
+from ...bend.bend import Draft
 from ...bend.plate import RIM_REACH
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats
-from ..maps.dense import bent_densely, drafted_from
+from ..maps.dense import begun, bent_densely, drafted_from
 from ..result.alignment import Alignment
+from ..result.confidence import DOUBTFUL
 from ..surfaces.remark import Remark
 from ..surfaces.side_by_side import Work, side_by_side, stages_of
-from .hypotheses import SIDES, Hypothesis, apart, by_own_mirror, by_pose, further, turned, unlike
+from .chances import draft_may_reach, may_reach
+from .hypotheses import SIDES, Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
 from .opposite import with_sides_open
-
-DOUBTFUL = 0.5
-"""Mean confidence up to which the whole map is doubted aloud."""
 
 FITS = 0.75
 """Mean confidence from which on a map that is not mirrored is taken as it is.
@@ -116,7 +116,7 @@ def reconsidered(
     likely = _screened(found, matched, first, hypotheses, clock.part(0.25, 0.4, "reconsider"))
     rough = unlike(matched, first[0], first[2]) * apart(first[0])
     clock.part(0.4, 0.5, "reconsider").begin("reconsider", "Trying another map", 0.0)
-    works = [partial(_drafted, each, NODES, first[0], UNLIKE) for each in likely]
+    works = [partial(_drafted, each, first[0], way) for each, way in likely]
     drafts = _in_order(side_by_side(works, clock.within(0.4, 0.5), threads=threads))
     least = min(rough, drafts[0][0]) if drafts else rough
     chosen: list[tuple[Hypothesis, _Draft]] = []
@@ -136,17 +136,28 @@ def reconsidered(
 _Draft = tuple[Draft, Booleans, Booleans]
 """As of `drafted_from`."""
 
+Kept = TypeVar("Kept")
+
 _Scored = tuple[float, Hypothesis, _Draft]
 
 
-def _drafted(each: Hypothesis, count: int, like: Draft, most: float, note: Callable[[float], None]) -> _Scored | None:
-    """Return a hypothesis with its draft by so many vertices and how badly that fits; None if it is `most` unlike."""
-    draft = drafted_from(each.alignment, stages_of(note), each.start, count, like)
+def _drafted(each: Hypothesis, like: Draft, way: int | None, note: Callable[[float], None]) -> _Scored | None:
+    """Return a hypothesis with its draft and how badly that fits; None if it is too unlike."""
+    draft = drafted_from(each.alignment, stages_of(note), each.start, like, way)
     differs = unlike(each.alignment, draft[0], draft[2])
-    return (differs * apart(draft[0]), each, draft) if differs <= most else None
+    return (differs * apart(draft[0]), each, draft) if differs <= UNLIKE else None
 
 
-def _in_order(drafts: Iterable[_Scored | None]) -> list[_Scored]:
+def _roughly_drafted(
+    each: Hypothesis, like: Draft, note: Callable[[float], None]
+) -> tuple[float, Hypothesis, Draft] | None:
+    """Return the same by a draft by `SCREENED` vertices, asked at these."""
+    draft = begun(each.alignment, stages_of(note), each.start, SCREENED, like)
+    differs = roughly_unlike(each.alignment, draft)
+    return (differs * apart(draft), each, draft) if differs <= ROUGHLY * UNLIKE else None
+
+
+def _in_order(drafts: Iterable[tuple[float, Hypothesis, Kept] | None]) -> list[tuple[float, Hypothesis, Kept]]:
     """Return the drafts that there are, those that fit best first."""
     return sorted((one for one in drafts if one is not None), key=lambda one: one[0])
 
@@ -161,26 +172,30 @@ def _screened(
     first: tuple[Draft, Booleans, Booleans],
     hypotheses: list[Hypothesis],
     clock: Part,
-) -> list[Hypothesis]:
-    """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more."""
+) -> list[tuple[Hypothesis, int | None]]:
+    """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more.
+
+    And which way each draft began: `Draft.way`.
+    """
     if not hypotheses:
         return []
-    begun, _, there = drafted_from(matched, clock.part(0.0, 0.1), None, SCREENED, first[0])
-    least = unlike(matched, begun, there) * apart(begun)
+    likewise = begun(matched, clock.part(0.0, 0.1), None, SCREENED, first[0], first[0].way)
+    least = roughly_unlike(matched, likewise) * apart(likewise)
     clock.begin("reconsider", "Trying another map", 0.1)
-    works = [partial(_drafted, each, SCREENED, begun, ROUGHLY * UNLIKE) for each in hypotheses]
+    works = [partial(_roughly_drafted, each, likewise) for each in hypotheses]
     drafts = _in_order(side_by_side(works, clock.within(0.1, 1.0), threads=found.settings.threads != 1))
-    known = [] if found.unfolded >= UNFOLDED else [first[0].places()]
+    drafts = [one for one in drafts if draft_may_reach(one[1].alignment, one[2], _needed(found, one[1].alignment))]
+    # at the nodes, which all drafts by few share
+    known = [] if found.unfolded >= UNFOLDED else [first[0].places()[likewise.few.nodes]]
     others = []
-    for score, each, (draft, *_) in drafts:
-        places = draft.places()
-        if not any(_same(places[draft.few.nodes], other[draft.few.nodes]) for other in known):
-            known.append(places)
-            others.append((score, each))
+    for score, each, draft in drafts:
+        if not any(_same(draft.now, other) for other in known):
+            known.append(draft.now)
+            others.append((score, each, draft.way))
     if not others:
         return []
     least = ROUGHLY * min(least, others[0][0])
-    return [each for score, each in others if _fitting(score, least, found, each)]
+    return [(each, way) for score, each, way in others if _fitting(score, least, found, each)]
 
 
 def _fitting(score: float, least: float, found: Alignment, each: Hypothesis) -> bool:
@@ -202,21 +217,42 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
 
-    begun: list[Hypothesis] = []
+    def worth(one: Alignment, samples: float) -> bool:
+        return may_reach(samples, len(one.source_samples), _needed(found, one))
+
+    turns: list[Hypothesis] = []
     works: list[Work[list[Hypothesis]]] = []
     other = turned(matched)
     if other is not None:
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
-        begun.append(Hypothesis(other, None, what))
+        turns.append(Hypothesis(other, None, what))
     if other is not None and matched.mobius.reflected:
-        works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
+        works.append(lambda note: list(further(other, MAXIMA - 1, partial(worth, other), stages_of(note))))
         works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
-        works.append(lambda _: [by_pose(matched, draft.onto)])
+        nodes = draft.few.nodes
+
+        def known(start: Floats) -> bool:
+            return found.unfolded < UNFOLDED and _same(start[nodes], draft.now)
+
+        works.append(lambda _: [one for one in (by_pose(matched, draft.onto, known),) if one is not None])
     if found.mean_confidence <= DOUBTFUL:
-        works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
+        works.append(lambda note: list(further(matched, MAXIMA, partial(worth, matched), stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
-    return [*begun, *chain.from_iterable(some)]
+    tried = [*turns, *chain.from_iterable(some)]
+    return [each for each in tried if worth(each.alignment, each.alignment.value)]
+
+
+def _needed(found: Alignment, other: Alignment) -> float:
+    """Return how much of the target another map has to make sure, at least, to be taken, or to be spoken of.
+
+    See `_decided`: a map that fits may be taken beside one that makes more sure.
+    """
+    if other.mobius.reflected == found.mobius.reflected:
+        more = PROVED
+    else:
+        more = 1 / OPEN if other.mobius.reflected else 1 / MIRRORED
+    return min(FITS, more * _sure(found))
 
 
 def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:

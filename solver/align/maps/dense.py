@@ -12,10 +12,11 @@ from ...flatten.sphere import Flat
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats, Integers
 from ..result.agreement import trust
-from ..result.alignment import Alignment
+from ..result.alignment import Alignment, Overlap
 from ..result.overlap import piece, shared
 from ..surfaces.remark import Remark
 from .pieces import overlap_of
+from .stretched import agrees_better
 
 PARTIAL = 0.02
 """Share of either surface's area without a counterpart from which on the rest is cut out and aligned anew."""
@@ -28,14 +29,25 @@ DRAFTS = 4
 
 
 def drafted_from(
-    found: Alignment, clock: Part, start: Floats | None = None, count: int = NODES, like: Draft | None = None
+    found: Alignment,
+    clock: Part,
+    start: Floats | None = None,
+    like: Draft | None = None,
+    way: int | None = None,
 ) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
 
     It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
-    `count` vertices of the target are bent. What does not depend on the map is taken from another draft of the same
-    surfaces, `like`.
+    `like` and `way` are as for `bend.drafted`.
     """
+    draft = begun(found, clock, start, NODES, like, way)
+    return draft, *shared(draft, found.source, found.target, clock.within(0.15, 0.2))
+
+
+def begun(
+    found: Alignment, clock: Part, start: Floats | None, count: int, like: Draft | None, way: int | None = None
+) -> Draft:
+    """Return a draft of the bending by `count` vertices of the target, begun as one of `drafted_from`."""
     clock.begin("bend", "Bending", 0.0)
     source, target = found.source, found.target
     believed = trust(
@@ -47,8 +59,7 @@ def drafted_from(
         found.difference,
     )
     tell = clock.within(0.0, 0.15)
-    draft = drafted(found.mobius, source, target, believed, start, count=count, progress=tell, like=like)
-    return draft, *shared(draft, source, target, clock.within(0.15, 0.2))
+    return drafted(found.mobius, source, target, believed, start, count=count, progress=tell, like=like, way=way)
 
 
 def bent_densely(
@@ -60,7 +71,7 @@ def bent_densely(
     """Bend the target onto the source from a first draft; where they show different pieces, what they share."""
     source, target = found.source, found.target
     draft, here, there = first
-    overlap = None
+    cut = None
     if max(left_out(source, target, here, there)) > PARTIAL:
         clock.begin("overlap", "Finding the overlap", 0.2)
         still = clock.within(0.2, 0.2)
@@ -74,7 +85,7 @@ def bent_densely(
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:
                 break
         if max(left_out(source, target, here, there)) > PARTIAL:
-            overlap = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+            cut = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
     remarks = found.remarks
     missing = left_out(source, target, here, there)
     if max(missing) > PARTIAL:
@@ -84,10 +95,22 @@ def bent_densely(
             if share > SETTLED
         )
         remarks += (Remark("partial", f"partial overlap: {apart} without a counterpart on the other surface"),)
-    if overlap is None:
-        clock.begin("bend", "Bending", 0.5)
-        bending = finished(draft, source, target, progress=clock.within(0.5, 1.0))
-        return replace(found, bending=bending, counterpart=there, remarks=remarks)
+    if cut is not None:
+        shared_alone = _of_overlap(found, cut[0], remarks)
+        if cut[1]:
+            return shared_alone
+    share = 0.5 if cut is None else 0.8
+    clock.begin("bend", "Bending", share)
+    bending = finished(draft, source, target, progress=clock.within(share, 1.0))
+    as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
+    if cut is not None and agrees_better(shared_alone, as_wholes):
+        return shared_alone
+    return as_wholes
+
+
+def _of_overlap(found: Alignment, overlap: Overlap, remarks: tuple[Remark, ...]) -> Alignment:
+    """Return the alignment by what two surfaces share alone."""
+    target = found.target
     # what the whole discs left open the pieces may decide
     remarks = tuple(one for one in remarks if one.kind != "rival")
     remarks += tuple(replace(one, before=f"in the overlap: {one.before}") for one in overlap.alignment.remarks)

@@ -48,8 +48,13 @@ def searched(
     settings: AlignSettings,
     clock: Part,
     landmarks: Integers | None,
+    enough: float | None = None,
 ) -> Alignment:
-    """Flatten and search; of prepared surfaces the rest is there already."""
+    """Flatten and search; of prepared surfaces the rest is there already.
+
+    `enough`: share of the samples of which it is asked in discs, with dense refinement, whether more match, and no more
+    than that.
+    """
     clock.begin("flatten source", "Flattening the source", 0.0)
     flattened(source_surface, target_surface, settings, clock.within(0.0, 0.1))
     source = source_surface.flattening
@@ -76,8 +81,10 @@ def searched(
         source_samples = np.concatenate([source_samples, pairs[rows, 0]])
         target_samples = np.concatenate([target_samples, pairs[:, 1]])
         problem = Objective(source.places[source_samples], target.places[target_samples], radius, weights)
-    search_all = searched_sphere if source.domain.closed else _both_sides
-    found, other, said = search_all(problem, settings, clock)
+    if source.domain.closed:
+        found, other, said = searched_sphere(problem, settings, clock)
+    else:
+        found, other, said = _both_sides(problem, settings, clock, enough)
     return Alignment(
         mobius=found.mobius,
         search=found,
@@ -190,7 +197,7 @@ def implied(source: Places, target: Places, weights: Floats, reflected: bool) ->
 
 
 def _both_sides(
-    problem: Objective, settings: AlignSettings, clock: Part
+    problem: Objective, settings: AlignSettings, clock: Part, enough: float | None
 ) -> tuple[SearchResult, SearchResult | None, list[Remark]]:
     """Search the orientations that the settings ask for; return the one to take, the other, and what is to be said."""
     if settings.reflect == "auto" and not _thorough(settings):
@@ -225,6 +232,7 @@ def _both_sides(
             time_limit=settings.time_limit,
             threads=settings.threads,
             most_nodes=settings.most_nodes,
+            enough=None if enough is None else enough * len(problem.source),
             progress=clock.searching(0.35 / len(sides)),
         )
         if result.cancelled:

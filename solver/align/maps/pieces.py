@@ -31,8 +31,11 @@ def overlap_of(
     target_part: Piece | None,
     clock: Part,
     landmarks: Integers | None,
-) -> Overlap | None:
-    """Align the parts that the surfaces seem to share, by a draft of the whole; None if it was mistaken."""
+) -> tuple[Overlap, bool] | None:
+    """Align the parts that the surfaces seem to share, by a draft of the whole; and whether it was surely not mistaken.
+
+    None where they are too small.
+    """
     if source_part is None or target_part is None:
         return None
     source_share = source_part.mesh.area / found.source.mesh.area
@@ -57,31 +60,30 @@ def overlap_of(
             )
             for part in (source_part, target_part)
         )
-        searching = clock.part(0.2, 0.5, "overlap")
+        searching = clock.part(0.2, 0.4, "overlap")
         inner = searched(source, target, settings, searching, pairs)
     except MeshError:  # too small a piece to flatten
         return None
-    if not _surely_better(inner.matched_weights, found.matched_weights):
-        return None
+    sure = _surely_better(inner.matched_weights, found.matched_weights)
     inner = challenged(inner, searching)
     face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
 
-    clock.begin("bend", "Bending", 0.5)
+    clock.begin("bend", "Bending", 0.4)
     scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
     start = scale * (draft.places()[target_part.vertices] - middle)
-    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.5, 0.6))
-    _, there = shared(again, inner.source, inner.target, clock.within(0.6, 0.6))
+    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.4, 0.5))
+    _, there = shared(again, inner.source, inner.target, clock.within(0.5, 0.5))
     bending = finished(
         again,
         inner.source,
         inner.target,
         _alike(again, inner, source_part.cut, target_part.cut),
-        clock.within(0.6, 1.0),
+        clock.within(0.5, 0.8),
     )
     inner = replace(inner, bending=bending, counterpart=there)
-    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric)
+    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric), sure
 
 
 def _surely_better(parts: Floats, whole: Floats) -> bool:

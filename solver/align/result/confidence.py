@@ -22,6 +22,9 @@ BOUND = 0.02
 MATCHED = 0.5
 """Confidence from which on a point counts as matched: more likely than not it errs by less than `BOUND`."""
 
+DOUBTFUL = 0.5
+"""Mean confidence up to which the whole map is doubted aloud."""
+
 NEAR_RIM = 0.05
 """Length over which the influence of the source's boundaries fades, in roots of the source's area."""
 

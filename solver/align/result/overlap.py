@@ -45,6 +45,13 @@ def shared(
     return here, ~_left_over(bent, onto, lambda share: tell((1 + share) / 2))
 
 
+def shared_nodes(draft: Draft, source: Flat, target: Flat) -> Booleans:
+    """Return which nodes of a draft, (q,), have a counterpart on the source, by themselves: nearly as `shared` says."""
+    if not (source.loops or target.loops):
+        return np.ones(len(draft.now), bool)
+    return ~_left_over(TriangleMesh(draft.now, draft.flat.faces), draft.onto, lambda _: None)
+
+
 def _left_over(mesh: TriangleMesh, surface: SurfacePoints, progress: Callable[[float], None]) -> Booleans:
     """Return which vertices of the mesh, (n,), lie more than `BEYOND` past a boundary of the surface.
 

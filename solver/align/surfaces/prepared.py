@@ -140,14 +140,14 @@ class Surface:
     def source_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
         """Return up to `count` vertices that stand for it as a source; `progress` as for `descriptors`."""
         if count not in self.points["source"]:
-            self._require_inside()
+            self.require_inside()
             self.points["source"][count] = source_points(self.flattening, self.descriptors(), count, progress)
         return self.points["source"][count]
 
     def target_points(self, count: int, progress: Callable[[float], None] | None = None) -> Integers:
         """Return up to `count` vertices that stand for it as a target; `progress` as for `descriptors`."""
         if count not in self.points["target"]:
-            self._require_inside()
+            self.require_inside()
             nowhere = np.empty(0, np.intp)
             self.points["target"][count] = farthest_points(
                 self.mesh, count, nowhere, interior(self.flattening), progress
@@ -160,7 +160,7 @@ class Surface:
             self._radii[count] = covering_radius(self.flattening.places[self.target_points(count)])
         return self._radii[count]
 
-    def _require_inside(self) -> None:
+    def require_inside(self) -> None:
         """Raise `MeshError` if too few vertices are inside the disc to tell one map from another."""
         inside = int(interior(self.flattening).sum())
         if inside < FEWEST:

@@ -22,6 +22,7 @@ from .pairs import (
     tooth,
 )
 from .store import Store
+from .trimmed import trimmed
 
 SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "simpop": of_kind("simpop", SIMPOP, simpop, True, "faces_simpop/SIMPOP_01.obj"),
@@ -36,6 +37,7 @@ SETS: dict[str, Callable[[Store, int | None], Iterator[Pair]]] = {
     "bent": bent,
     "partial": partial,
     "cropped": cropped,
+    "trimmed": trimmed,
     "bodyparts": kinds.bodyparts,
     "noise": kinds.noisy,
     "depth": kinds.depth_scans,

@@ -100,7 +100,9 @@ def test_a_rigid_pose_implies_a_transformation_of_the_sphere():
     matched = align(mesh, TriangleMesh(2 * mesh.vertices @ turn.T + 1, mesh.faces), replace(FEW, refine="mobius"))
     clock = Stages(None).part(0.0, 1.0)
     wrong = replace(matched, mobius=random_mobius(np.random.default_rng(4), 0.1, reflect=False))
-    found = by_pose(wrong, drafted_from(wrong, clock)[0].onto).alignment
+    hypothesis = by_pose(wrong, drafted_from(wrong, clock)[0].onto, lambda _: False)
+    assert hypothesis is not None
+    found = hypothesis.alignment
     assert isinstance(found.mobius, SphereMobius)
     there = found.mobius(found.source.places)
     assert np.linalg.norm(there - found.target.places, axis=1).max() < 0.01

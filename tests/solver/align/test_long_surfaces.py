@@ -68,6 +68,8 @@ def test_too_few_vertices_inside_are_refused_by_name() -> None:
     for source, target in ((one, belt(4, 5)), (belt(4, 5), one), (belt(8, 2), belt(8, 2))):
         with pytest.raises(MeshError, match=r"^'(One|Belt)' has 0 vertices inside its boundary"):
             align(source, target)
+    with pytest.raises(MeshError, match=r"^'One' has 0 vertices inside its boundary"):
+        held(verdict(one).tidy)
 
 
 @pytest.mark.parametrize(

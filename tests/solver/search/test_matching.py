@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from instances import disc_points, nasty_points, random_problem
 
-from solver import Mobius
+from solver import Mobius, search
 from solver.mobius import hyperbolic_distance
 from solver.search.matching import matching
 
@@ -88,3 +88,12 @@ def test_absurd_input_is_refused_by_name(change, words):
     source, target, radius = given.pop("source"), given.pop("target"), given.pop("radius")
     with pytest.raises(ValueError, match=words):
         matching(source, target, radius, **given)
+
+
+def test_the_smallest_and_the_largest_radii_are_taken_as_they_are():
+    """A disc that floats have no radius for holds its centre; a huge one holds everything."""
+    tiny = matching([0, 0.5], [0, 0.5], 5e-324)
+    assert tiny.evaluated(Mobius())[0] == 2
+    assert tiny.matches(Mobius()).tolist() == [[0, 0], [1, 1]]
+    found = search([0, 0.5j], [0.5], 1e300, metric="euclidean")
+    assert found.value == found.upper_bound == 2

@@ -219,6 +219,30 @@ def test_the_check_proves_a_bound_again_and_refuses_a_wrong_one():
     assert len(certify_sphere(reflected, 0, 3, source, target, 0.4, h_max=0.05).objections) >= 2
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"radius": -0.4},
+        {"radius": np.nan},
+        {"radius": 5},
+        {"radius": [0.4, 0.4]},
+        {"h_max": -0.1},
+        {"h_max": np.nan},
+        {"source": 2 * np.eye(3)},
+        {"source": np.eye(3)[:, :2]},
+        {"target": np.full((3, 3), np.nan)},
+        {"weights": np.full((3, 3), 2)},
+        {"weights": np.full((3, 3), np.nan)},
+        {"weights": np.ones(3)},
+    ],
+)
+def test_nothing_is_certified_about_what_cannot_be_searched(wrong):
+    given = {"source": np.eye(3), "target": np.eye(3), "radius": 0.4, "h_max": 0.0}
+    assert certify_sphere(SphereMobius(), 3, 3, **given, prove=True).bound_holds
+    with pytest.raises(ValueError, match=next(iter(wrong)).removesuffix("s")):
+        certify_sphere(SphereMobius(), 3, 3, **given | wrong, prove=True)
+
+
 def test_pairs_on_the_rim_are_decided_exactly():
     """A quaternion of whole numbers and points of Pythagoras: the distance is the root of 2 to the last digit."""
     f = SphereMobius(rotation=(1, 0, 0, 1))  # x to y

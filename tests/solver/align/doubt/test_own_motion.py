@@ -24,7 +24,7 @@ def sheet(around: int, seed: int) -> TriangleMesh:
     return TriangleMesh(np.column_stack([x, y, height]), bumps(700, seed=seed).faces)
 
 
-@pytest.mark.parametrize("around", [3, 4, 1])
+@pytest.mark.parametrize("around", [3, 1])
 def test_where_a_sheet_is_alike_a_part_of_it_may_lie_elsewhere(around: int) -> None:
     """Turned about the middle by a share of a full turn, each as far as that is; what is not alike is not doubted."""
     one, other = sheet(around, 1), sheet(around, 2)

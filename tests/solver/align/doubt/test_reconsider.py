@@ -68,7 +68,8 @@ def test_a_rigid_pose_implies_the_right_map(found):
     """Found without the search's map: the Möbius transformation, and where the bending begins."""
     onto = drafted(found.mobius, found.source, found.target).onto
     wrong = replace(found, mobius=replace(found.mobius, theta=found.mobius.theta + 2.0))
-    hypothesis = by_pose(wrong, onto)
+    hypothesis = by_pose(wrong, onto, lambda _: False)
+    assert hypothesis is not None
     implied = hypothesis.alignment
     assert not implied.mobius.reflected
     assert np.abs(implied.mobius.z - found.mobius.z) < 0.02
@@ -87,4 +88,4 @@ def test_few_vertices_show_which_hypotheses_are_lost(found):
     tried = [Hypothesis(one, None, name) for one, name in ((right, "right"), (wrong, "wrong"))]
     for first, left in ((wrong, ["right"]), (right, [])):
         likely = _screened(found, first, drafted_from(first, clock), tried, clock)
-        assert [one.what for one in likely] == left
+        assert [one.what for one, _ in likely] == left

@@ -9,9 +9,10 @@ from scipy.spatial import KDTree
 from surfaces import planar, rings
 
 from solver import AlignSettings, Progress, TriangleMesh, align, correspond, flatten, report, topology
-from solver.align.doubt.reconsider import DOUBTFUL, FITS
+from solver.align.doubt.reconsider import FITS
 from solver.align.maps.pieces import _surely_better
 from solver.align.result import overlap
+from solver.align.result.confidence import DOUBTFUL
 from solver.align.result.overlap import depth_beyond, piece
 from solver.flatten.distortion import signed_areas
 from solver.surface.nearest import SurfacePoints
