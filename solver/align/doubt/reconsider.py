@@ -240,7 +240,8 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         works.append(lambda note: list(further(matched, MAXIMA, partial(worth, matched), stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
     tried = [*turns, *chain.from_iterable(some)]
-    return [each for each in tried if worth(each.alignment, each.alignment.value)]
+    # of sides that share little the samples of the whole match as little
+    return [each for each in tried if each.what == SIDES or worth(each.alignment, each.alignment.value)]
 
 
 def _needed(found: Alignment, other: Alignment) -> float:
@@ -251,7 +252,7 @@ def _needed(found: Alignment, other: Alignment) -> float:
     if other.mobius.reflected == found.mobius.reflected:
         more = PROVED
     else:
-        more = 1 / OPEN if other.mobius.reflected else 1 / MIRRORED
+        more = 1 / OPEN if other.mobius.reflected else OPPOSITE * FITS
     return min(FITS, more * _sure(found))
 
 
