@@ -13,6 +13,7 @@ from .cut.cutting import fitting_pieces, like_pieces
 from .diagnosis import causes, coarse, deep
 from .doubt.inside_out import turned_round
 from .doubt.other_rim import with_other_rim
+from .doubt.own_motion import with_motions_open
 from .doubt.reconsider import FITS, reconsidered
 from .maps.dense import bent_densely, drafted_from
 from .maps.mobius_map import roughly_aligned
@@ -154,7 +155,7 @@ def _of_main_parts(
         elif rim is not None:
             found, source, target = rim
         elif not settings.take_rival and pairs is None:  # these decide
-            found = reconsidered(found, matched, first, clock.part(0.97, 1))
+            found = with_motions_open(reconsidered(found, matched, first, clock.part(0.97, 1)))
             if found.mean_confidence <= DOUBTFUL and settings.cut and all(map(deep, (source, target))):
                 again = like_pieces(source, target, settings, clock.part(0.97, 0.98))
                 if again is not None:

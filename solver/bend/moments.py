@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
-from .pose import ASKED, FEW, MOST, in_poses, misfits
+from .pose import ASKED, FEW, MOST, in_pose, in_poses, misfit, misfits
 
 FEW_ROUNDS = 5
 """Closest point rounds by which the poses are compared."""
@@ -34,11 +34,10 @@ def posed(mesh: TriangleMesh, onto: SurfacePoints, roughly: SurfacePoints) -> tu
     starts = np.stack([(mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other for turn in _turns()])
     tried = in_poses(mesh, starts, roughly, FEW_ROUNDS, FEW)
     apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in tried], roughly, ASKED)
-    kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], roughly, most=FEW)
-    kept = in_poses(mesh, kept, onto)
-    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in kept], onto, MOST)
-    best = int(np.argmin(apart))
-    return kept[best], float(apart[best])
+    kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], roughly)
+    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in kept], roughly, MOST)
+    best = in_pose(mesh.moved(kept[int(np.argmin(apart))]), onto)
+    return best, misfit(mesh.moved(best), onto)
 
 
 def _rigid(one: Floats, two: Floats) -> tuple[Floats, Floats]:

@@ -16,11 +16,13 @@ from ..result.alignment import Alignment
 from ..result.confidence import COLUMNS, probability, unmatched_share
 from ..result.overlap import shared_nodes
 
-UNFORESEEN = 1.5
-"""Factor by which more may be sure of a bent map than its samples promise: what two surfaces share is searched anew."""
+UNFORESEEN = 2.5
+"""Factor by which more of the target may be sure of a bent map than its samples promise: what both surfaces show is cut
+out and searched anew. Of 95 bent maps of 8 kinds of surface at most 2.46, of a face that lacks 30 %; where nothing is
+missing 1.2."""
 
-UNFORESEEN_BY_DRAFT = 2.0
-"""The same for what a draft lets expect."""
+UNFORESEEN_BY_DRAFT = 4.0
+"""The same for what a draft by few vertices lets expect: at most 3.7, and 1.05 where nothing is missing."""
 
 
 def promised(samples: float, count: int) -> float:

@@ -1,9 +1,9 @@
 """Which of several maps is taken, where the search's best is in doubt: the one place that decides.
 
-Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Each is drafted, and
-given up there if another draft fits clearly better; what is left is bent like the first, and all are judged by the same
-calibrated measure: how much of the target is surely right (`Alignment.confidence`). A mirrored map has to be better
-than any other by more than chance.
+Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Those of which the
+samples promise enough (`chances`) are drafted, by few vertices first, and given up there if another draft fits clearly
+better; what is left is bent like the first, and all are judged by the same calibrated measure: how much of the target
+is surely right (`Alignment.confidence`). A mirrored map has to be better than any other by more than chance.
 """
 
 from __future__ import annotations
@@ -240,7 +240,8 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         works.append(lambda note: list(further(matched, MAXIMA, partial(worth, matched), stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
     tried = [*turns, *chain.from_iterable(some)]
-    return [each for each in tried if worth(each.alignment, each.alignment.value)]
+    # of sides that share little the samples of the whole match as little
+    return [each for each in tried if each.what == SIDES or worth(each.alignment, each.alignment.value)]
 
 
 def _needed(found: Alignment, other: Alignment) -> float:
@@ -251,7 +252,7 @@ def _needed(found: Alignment, other: Alignment) -> float:
     if other.mobius.reflected == found.mobius.reflected:
         more = PROVED
     else:
-        more = 1 / OPEN if other.mobius.reflected else 1 / MIRRORED
+        more = 1 / OPEN if other.mobius.reflected else OPPOSITE * FITS
     return min(FITS, more * _sure(found))
 
 
