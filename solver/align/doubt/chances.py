@@ -11,6 +11,7 @@ import numpy as np
 from ...bend.bend import Draft
 from ...surface.mesh import Floats, TriangleMesh
 from ...surface.statistics import weighted_median
+from ..maps.dense import PARTIAL
 from ..result.agreement import descriptor_distance
 from ..result.alignment import Alignment
 from ..result.confidence import COLUMNS, probability, unmatched_share
@@ -48,13 +49,15 @@ def expected(found: Alignment, draft: Draft) -> float:
     own = found.target_descriptors[draft.few.nodes]
     distance = descriptor_distance(found.source, found.source_descriptors, own, face, barycentric)
     areas = draft.flat.vertex_areas
+    missing = 1 - areas @ shared / areas.sum()
     tiny = np.finfo(float).tiny
     stretch = np.log(np.maximum(nodes.vertex_areas, tiny) / np.maximum(areas, tiny)) / 2
     seen = _columns(
         np.ones(len(areas)),
         descriptors=np.minimum(distance / np.sqrt(own.shape[1]), 3),
         stretch=np.minimum(np.abs(stretch - weighted_median(stretch, areas)), 2),
-        unmatched=unmatched_share(found.value, len(found.source_samples)),
+        # what the surfaces share is searched anew: what the samples of the wholes say does not count then
+        unmatched=0.0 if missing > PARTIAL else unmatched_share(found.value, len(found.source_samples)),
     )
     return float(areas @ (probability(seen, bent=True) * shared) / areas.sum())
 

@@ -116,7 +116,7 @@ def reconsidered(
     likely = _screened(found, matched, first, hypotheses, clock.part(0.25, 0.4, "reconsider"))
     rough = unlike(matched, first[0], first[2]) * apart(first[0])
     clock.part(0.4, 0.5, "reconsider").begin("reconsider", "Trying another map", 0.0)
-    works = [partial(_drafted, each, first[0], way) for each, way in likely]
+    works = [partial(_drafted, each, first[0]) for each in likely]
     drafts = _in_order(side_by_side(works, clock.within(0.4, 0.5), threads=threads))
     least = min(rough, drafts[0][0]) if drafts else rough
     chosen: list[tuple[Hypothesis, _Draft]] = []
@@ -141,9 +141,9 @@ Kept = TypeVar("Kept")
 _Scored = tuple[float, Hypothesis, _Draft]
 
 
-def _drafted(each: Hypothesis, like: Draft, way: int | None, note: Callable[[float], None]) -> _Scored | None:
+def _drafted(each: Hypothesis, like: Draft, note: Callable[[float], None]) -> _Scored | None:
     """Return a hypothesis with its draft and how badly that fits; None if it is too unlike."""
-    draft = drafted_from(each.alignment, stages_of(note), each.start, like, way)
+    draft = drafted_from(each.alignment, stages_of(note), each.start, like)
     differs = unlike(each.alignment, draft[0], draft[2])
     return (differs * apart(draft[0]), each, draft) if differs <= UNLIKE else None
 
@@ -172,11 +172,8 @@ def _screened(
     first: tuple[Draft, Booleans, Booleans],
     hypotheses: list[Hypothesis],
     clock: Part,
-) -> list[tuple[Hypothesis, int | None]]:
-    """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more.
-
-    And which way each draft began: `Draft.way`.
-    """
+) -> list[Hypothesis]:
+    """Return the hypotheses that a draft by few vertices does not show to be lost, or to be the first once more."""
     if not hypotheses:
         return []
     likewise = begun(matched, clock.part(0.0, 0.1), None, SCREENED, first[0], first[0].way)
@@ -191,11 +188,11 @@ def _screened(
     for score, each, draft in drafts:
         if not any(_same(draft.now, other) for other in known):
             known.append(draft.now)
-            others.append((score, each, draft.way))
+            others.append((score, each))
     if not others:
         return []
     least = ROUGHLY * min(least, others[0][0])
-    return [(each, way) for score, each, way in others if _fitting(score, least, found, each)]
+    return [each for score, each in others if _fitting(score, least, found, each)]
 
 
 def _fitting(score: float, least: float, found: Alignment, each: Hypothesis) -> bool:

@@ -33,14 +33,13 @@ def drafted_from(
     clock: Part,
     start: Floats | None = None,
     like: Draft | None = None,
-    way: int | None = None,
 ) -> tuple[Draft, Booleans, Booleans]:
     """Return a first draft of the bending, and the vertices of source and target that have a counterpart by it.
 
     It begins at the Möbius map, or where the target's vertices are nearly, (n, 3), in the frame of `Draft.onto`.
-    `like` and `way` are as for `bend.drafted`.
+    `like` is as for `bend.drafted`.
     """
-    draft = begun(found, clock, start, NODES, like, way)
+    draft = begun(found, clock, start, NODES, like)
     return draft, *shared(draft, found.source, found.target, clock.within(0.15, 0.2))
 
 
@@ -95,15 +94,14 @@ def bent_densely(
             if share > SETTLED
         )
         remarks += (Remark("partial", f"partial overlap: {apart} without a counterpart on the other surface"),)
-    if cut is not None:
-        shared_alone = _of_overlap(found, cut[0], remarks)
-        if cut[1]:
-            return shared_alone
+    shared_alone = None if cut is None else _of_overlap(found, cut[0], remarks)
+    if shared_alone is not None and cut is not None and cut[1]:
+        return shared_alone
     share = 0.5 if cut is None else 0.8
     clock.begin("bend", "Bending", share)
     bending = finished(draft, source, target, progress=clock.within(share, 1.0))
     as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
-    if cut is not None and agrees_better(shared_alone, as_wholes):
+    if shared_alone is not None and agrees_better(shared_alone, as_wholes):
         return shared_alone
     return as_wholes
 

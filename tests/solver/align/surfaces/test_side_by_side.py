@@ -111,7 +111,7 @@ def test_any_word_of_progress_may_cancel_it(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "EVERY", 1e-4)
     monkeypatch.setattr(reconsider, "FITS", 2.0)
     before = threading.active_count()
-    for last in (3, 8, 20, 700):
+    for last in (3, 8, 20, 100):
         told: list[float] = []
 
         def until(state: Progress, told: list[float] = told, last: int = last) -> bool:
