@@ -111,16 +111,16 @@ def test_any_word_of_progress_may_cancel_it(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "EVERY", 1e-4)
     monkeypatch.setattr(reconsider, "FITS", 2.0)
     before = threading.active_count()
-    for last in (3, 8, 20, 100):
-        told: list[float] = []
+    for last, stage in ((3, ""), (8, ""), (20, ""), (5, "Trying another map")):
+        told: list[str] = []
 
-        def until(state: Progress, told: list[float] = told, last: int = last) -> bool:
-            told.append(state.fraction)
-            return len(told) < last
+        def until(state: Progress, told: list[str] = told, last: int = last, stage: str = stage) -> bool:
+            told.append(state.stage)
+            return (told.count(stage) if stage else len(told)) < last
 
         with pytest.raises(Cancelled):
             align(*pair(), SMALL, until)
-        assert len(told) == last
+        assert (told.count(stage) if stage else len(told)) == last
         assert threading.active_count() == before
 
 
