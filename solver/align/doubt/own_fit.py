@@ -43,7 +43,7 @@ class OwnFit:
         size = float((high - low).max()) / CELLS
         self._low, self._size = low - size, size
         self._shape = np.ceil((high - low) / size).astype(np.intp) + 2
-        middles = np.stack(np.indices(self._shape).reshape(3, -1), axis=1) * size + self._low + size / 2
+        middles = np.indices(tuple(self._shape)).reshape(3, -1).T * size + self._low + size / 2
         self._near = used[KDTree(mesh.vertices[used]).query(middles)[1]]
         self._rim = np.zeros(len(mesh.vertices), bool)
         if onto.loops:

@@ -89,7 +89,8 @@ def _likely(own: OwnFit) -> Iterator[tuple[Floats, Floats]]:
     planes, shares = [], []
     for normal in directions:
         along = (points - centre) @ normal
-        offsets = np.arange(*np.quantile(along, (0.1, 0.9)), BETWEEN)
+        least, most = np.quantile(along, (0.1, 0.9))
+        offsets = np.arange(least, most, BETWEEN)
         away = along - offsets[:, None]
         image = points - 2 * away[..., None] * normal
         lies, beyond = own.roughly(image, np.broadcast_to(_turned(facing, normal), image.shape))

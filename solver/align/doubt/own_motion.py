@@ -106,7 +106,8 @@ def motions(found: Alignment) -> Iterator[Motion]:
         return
     own = OwnFit(ready(found.source))
     diagonal = own.onto.mesh.diagonal
-    face, barycentric = (each[some] for each in found.located)
+    face, barycentric = found.located
+    face, barycentric = face[some], barycentric[some]
     points, normals, _ = own.onto.at(face, barycentric)
     points[~matched], normals[~matched] = _carried(found, some, matched, points)
     wanted = found.target_descriptors[some]
