@@ -88,4 +88,4 @@ def test_few_vertices_show_which_hypotheses_are_lost(found):
     tried = [Hypothesis(one, None, name) for one, name in ((right, "right"), (wrong, "wrong"))]
     for first, left in ((wrong, ["right"]), (right, [])):
         likely = _screened(found, first, drafted_from(first, clock), tried, clock)
-        assert [one.what for one, _ in likely] == left
+        assert [one.what for one in likely] == left
