@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from .diagnosis import CROPPED
-from .doubt.reconsider import FITS
+from .doubt.decision import FITS
 from .result.alignment import Alignment
 from .result.confidence import DOUBTFUL, MATCHED
 from .surfaces.remark import Kind, Remark

@@ -11,10 +11,11 @@ from ..stages import Part, Progress, Stages
 from ..surface.mesh import MeshError, TriangleMesh
 from .cut.cutting import fitting_pieces, like_pieces
 from .diagnosis import causes, coarse, deep
+from .doubt.decision import FITS
 from .doubt.inside_out import turned_round
 from .doubt.other_rim import with_other_rim
 from .doubt.own_motion import with_motions_open
-from .doubt.reconsider import FITS, reconsidered
+from .doubt.reconsider import reconsidered
 from .maps.dense import bent_densely, drafted_from
 from .maps.mobius_map import roughly_aligned
 from .parts.completing import completed

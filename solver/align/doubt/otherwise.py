@@ -9,6 +9,7 @@ from ..maps.mobius_map import challenged, searched
 from ..result.alignment import Alignment
 from ..result.confidence import DOUBTFUL
 from ..surfaces.prepared import Surface
+from .decision import sure
 from .hypotheses import unlike
 from .reconsider import UNLIKE
 
@@ -48,8 +49,3 @@ def otherwise(
         return None
     other = bent_densely(matched, first, part, landmarks)
     return other if sure(other) > max(DOUBTFUL, sure(found)) else None
-
-
-def sure(found: Alignment) -> float:
-    """Return the mean confidence over the target's whole area."""
-    return float(found.confidence @ found.target.mesh.vertex_areas / found.target.mesh.area)

@@ -1,4 +1,4 @@
-"""Which of several maps is taken, where the search's best is in doubt: the one place that decides.
+"""Other maps that are tried, where the search's best is in doubt, until one of them can be taken (`decision`).
 
 Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Those of which the
 samples promise enough (`chances`) are drafted, by few vertices first, and given up there if another draft fits clearly
@@ -22,18 +22,11 @@ from ...surface.mesh import Booleans, Floats
 from ..maps.dense import begun, bent_densely, drafted_from
 from ..result.alignment import Alignment
 from ..result.confidence import DOUBTFUL
-from ..surfaces.remark import Remark
 from ..surfaces.side_by_side import Work, side_by_side, stages_of
 from .chances import draft_may_reach, may_reach
+from .decision import FITS, decided, needed
 from .hypotheses import SIDES, Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
 from .opposite import with_sides_open
-
-FITS = 0.75
-"""Mean confidence from which on a map that is not mirrored is taken as it is.
-
-Of 36 maps of faces that lack 30 % each, and of teeth, the right ones had 0.72 or more, the wrong ones that were not
-mirrored 0.31 or less; a sheet, not mirrored where mirrored is right, 0.55.
-"""
 
 UNFOLDED = 0.2
 """Share of the vertices that the unfolding moved from which on a map is in doubt: on 157 pairs of all kinds 34 had as
@@ -66,28 +59,6 @@ WORSE = 1.2
 
 SAME = RIM_REACH
 """Median distance, in roots of the source's area, up to which two drafts are of one map: what Möbius maps err by."""
-
-PROVED = 1.15
-"""Factor by which more of the target has to be surely right by another map of one orientation for it to be taken."""
-
-MIRRORED = 1.5
-"""The same for a mirrored map beside one that is not.
-
-Of 8 pairs of noisy faces and one seen by a camera, nearly symmetric, mirrored wrong maps had up to 1.22 times as much
-as the right ones; on mirrored hands, feet, ears and teeth the right ones had 1.9 times as much, or more, as any that
-was not mirrored: the middle of the two.
-"""
-
-OPPOSITE = 4 / 7
-"""Share of either scan that both show of one thing from which 30 %, as much as is found, are missing on opposite sides.
-
-A map that is not mirrored and fits on as much is taken, though of something symmetric a mirrored one covers more. Of
-mirrored hands, feet, ears and teeth, maps that were not mirrored had a mean confidence of 0.44 at most.
-"""
-
-OPEN = 1.02
-"""Factor from which on it is said that a mirrored map, which is not taken, fits better; where neither fits, one that
-does not fit worse by as much: a head that is nearly symmetric had 1.01, and was the mirrored one."""
 
 
 def in_doubt(found: Alignment) -> bool:
@@ -129,8 +100,8 @@ def reconsidered(
             chosen.append((each, draft))
     works = [partial(_bent, each, draft) for each, draft in chosen]
     bent = side_by_side(works, clock.within(0.5, 1.0), threads=threads)
-    decided = _decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
-    return with_sides_open(decided, any(each.what == SIDES for each in hypotheses))
+    best = decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
+    return with_sides_open(best, any(each.what == SIDES for each in hypotheses))
 
 
 _Draft = tuple[Draft, Booleans, Booleans]
@@ -181,18 +152,32 @@ def _screened(
     clock.begin("reconsider", "Trying another map", 0.1)
     works = [partial(_roughly_drafted, each, likewise) for each in hypotheses]
     drafts = _in_order(side_by_side(works, clock.within(0.1, 1.0), threads=found.settings.threads != 1))
-    drafts = [one for one in drafts if draft_may_reach(one[1].alignment, one[2], _needed(found, one[1].alignment))]
-    # at the nodes, which all drafts by few share
-    known = [] if found.unfolded >= UNFOLDED else [first[0].places()[likewise.few.nodes]]
-    others = []
-    for score, each, draft in drafts:
-        if not any(_same(draft.now, other) for other in known):
-            known.append(draft.now)
-            others.append((score, each))
+    drafts = [one for one in drafts if draft_may_reach(one[1].alignment, one[2], needed(found, one[1].alignment))]
+    if found.unfolded < UNFOLDED:  # else the right one may be the same, and be unfolded from another start
+        before = first[0].places()[likewise.few.nodes]
+        drafts = [one for one in drafts if not _same(one[2].now, before)]
+    others = _each_once(drafts)
     if not others:
         return []
     least = ROUGHLY * min(least, others[0][0])
-    return [each for score, each in others if _fitting(score, least, found, each)]
+    return [each for score, each, _ in others if _fitting(score, least, found, each)]
+
+
+def _each_once(
+    drafts: list[tuple[float, Hypothesis, Draft]],
+) -> list[tuple[float, Hypothesis, Draft]]:
+    """Return the drafts, best first, without those of a map that is among them already.
+
+    Of two of one map that stays whose beginning is given: a draft by more vertices begins there too.
+    """
+    kept: list[tuple[float, Hypothesis, Draft]] = []
+    for score, each, draft in drafts:
+        again = next((k for k, other in enumerate(kept) if _same(draft.now, other[2].now)), None)
+        if again is None:
+            kept.append((score, each, draft))
+        elif kept[again][1].start is None and each.start is not None:
+            kept[again] = kept[again][0], each, draft
+    return kept
 
 
 def _fitting(score: float, least: float, found: Alignment, each: Hypothesis) -> bool:
@@ -215,7 +200,7 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     clock.begin("reconsider", "Trying another map", 0.0)
 
     def worth(one: Alignment, samples: float) -> bool:
-        return may_reach(samples, len(one.source_samples), _needed(found, one))
+        return may_reach(samples, len(one.source_samples), needed(found, one))
 
     turns: list[Hypothesis] = []
     works: list[Work[list[Hypothesis]]] = []
@@ -239,63 +224,3 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     tried = [*turns, *chain.from_iterable(some)]
     # of sides that share little the samples of the whole match as little
     return [each for each in tried if each.what == SIDES or worth(each.alignment, each.alignment.value)]
-
-
-def _needed(found: Alignment, other: Alignment) -> float:
-    """Return how much of the target another map has to make sure, at least, to be taken, or to be spoken of.
-
-    See `_decided`: a map that fits may be taken beside one that makes more sure.
-    """
-    if other.mobius.reflected == found.mobius.reflected:
-        more = PROVED
-    else:
-        more = 1 / OPEN if other.mobius.reflected else OPPOSITE * FITS
-    return min(FITS, more * _sure(found))
-
-
-def _decided(bent: list[tuple[Alignment, str]]) -> Alignment:
-    """Return the best of bent maps, the first of which is the search's best; mirrored only by proof."""
-    plain = [one for one in bent if not one[0].mobius.reflected]
-    mirrored = [one for one in bent if one[0].mobius.reflected]
-    best, said = _ahead(plain or mirrored), ""
-    if plain and mirrored:  # each by itself, then by proof
-        one, two = (_ahead(some) for some in (plain, mirrored))
-        ahead = _sure(two[0]) / max(_sure(one[0]), 1e-12)
-        fits = one[0].mean_confidence >= FITS
-        best = one if ahead < MIRRORED or (fits and ahead < 1 / (OPPOSITE * FITS)) else two
-        if best is two and fits:
-            said = (
-                f"ambiguous orientation: not mirrored, {100 * _sure(one[0]):.0f} % of the target are surely right too, "
-                f"mirrored {100 * _sure(two[0]):.0f} %; taken as mirrored"
-            )
-        if best is one and ahead > (OPEN if one[0].mean_confidence >= FITS else 1 / OPEN):
-            said = (
-                f"ambiguous orientation: mirrored, {100 * _sure(two[0]):.0f} % of the target are surely right, not "
-                f"mirrored {100 * _sure(one[0]):.0f} %; taken as not mirrored"
-            )
-    found, what = best
-    if found.mobius.reflected and found.overlap is not None and found.other is not None:
-        # the other sides of two pieces of something symmetric fit each other as well as one side fits itself
-        said = (
-            "ambiguous orientation: what the surfaces have in common matches only mirrored; if they show something "
-            "symmetric, these are opposite sides of it"
-        )
-    remarks = found.remarks
-    if what:
-        text = f"reconsidered: the best map of the search fits less well than {what}, which is taken"
-        remarks = (Remark("reconsidered", text), *remarks)
-    return found.annotated(remarks=(Remark("orientation", said), *remarks) if said else remarks)
-
-
-def _ahead(bent: list[tuple[Alignment, str]]) -> tuple[Alignment, str]:
-    """Return the first of maps of one orientation, unless another fits that does not, or is better beyond chance."""
-    most = max(_sure(found) for found, _ in bent)
-    fitting = [one for one in bent if one[0].mean_confidence >= FITS and _sure(one[0]) > DOUBTFUL * most]
-    some = fitting or bent
-    best = max(some, key=lambda one: _sure(one[0]))
-    return best if _sure(best[0]) > PROVED * _sure(some[0][0]) else some[0]
-
-
-def _sure(found: Alignment) -> float:
-    """Return the mean confidence over the target's whole area."""
-    return float(found.confidence @ found.target.mesh.vertex_areas / found.target.mesh.area)

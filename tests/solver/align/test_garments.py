@@ -8,7 +8,7 @@ from garments import Form, band_form, ring_form, tube_form, woven
 from scans import percent, places, posed
 
 from solver import Alignment, AlignSettings, MeshError, align, correspond
-from solver.align.doubt.reconsider import FITS
+from solver.align.doubt.decision import FITS
 from solver.align.judgement import judge
 
 QUICK = AlignSettings(samples=60, targets=500, reflect="never")

@@ -5,8 +5,9 @@ import pytest
 from scans import bumps, posed, remeshed
 
 from solver import AlignSettings, align
+from solver.align.doubt.decision import MIRRORED, decided
 from solver.align.doubt.hypotheses import Hypothesis, by_pose
-from solver.align.doubt.reconsider import MIRRORED, _decided, _screened, in_doubt
+from solver.align.doubt.reconsider import _screened, in_doubt
 from solver.align.maps.dense import drafted_from
 from solver.bend.bend import drafted
 from solver.stages import Stages
@@ -43,10 +44,10 @@ def test_mirrored_is_taken_by_proof_alone(found, plain, mirrored, taken, open_):
     """Clearly better than a map that does not fit; whichever of the two the search preferred."""
     one, two = said(found, plain, reflected=False), said(found, mirrored, reflected=True)
     for bent in ([(one, ""), (two, "the mirrored one")], [(two, ""), (one, "the one that is not mirrored")]):
-        decided = _decided(bent)
-        assert decided.mobius.reflected == taken
-        assert any(text.startswith("ambiguous orientation: ") for text in decided.warnings) == open_
-        assert any(text.startswith("reconsidered: ") for text in decided.warnings) == (
+        best = decided(bent)
+        assert best.mobius.reflected == taken
+        assert any(text.startswith("ambiguous orientation: ") for text in best.warnings) == open_
+        assert any(text.startswith("reconsidered: ") for text in best.warnings) == (
             bent[0][0] is not (two if taken else one)
         )
 
@@ -54,7 +55,7 @@ def test_mirrored_is_taken_by_proof_alone(found, plain, mirrored, taken, open_):
 def test_of_one_orientation_another_is_taken_where_the_first_does_not_fit(found):
     poor, first, fits, more = (said(found, sure, reflected=False) for sure in (0.4, 0.7, 0.8, 0.9))
     for one, two, other in ((first, fits, True), (fits, more, False), (poor, first, True)):
-        assert any("than x, which" in text for text in _decided([(one, ""), (two, "x")]).warnings) == other
+        assert any("than x, which" in text for text in decided([(one, ""), (two, "x")]).warnings) == other
 
 
 def test_a_right_map_is_not_in_doubt(found):

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from surfaces import planar, rings
 
 from solver import AlignSettings, Progress, TriangleMesh, align, correspond, flatten, report, topology
-from solver.align.doubt.reconsider import FITS
+from solver.align.doubt.decision import FITS
 from solver.align.maps.pieces import _surely_better
 from solver.align.result import overlap
 from solver.align.result.confidence import DOUBTFUL
