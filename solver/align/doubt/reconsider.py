@@ -123,7 +123,9 @@ def reconsidered(
     # a map that could not be unfolded may be the right one all the same, and come out from another start
     known = [] if found.unfolded >= UNFOLDED else [first[0].now]
     for score, each, draft in drafts:
-        again = any(_same(draft[0].now, other) for other in known)
+        # where one from a Möbius map has come to the same, that is the one: its samples say more of it
+        others = [other[0].now for _, one, other in drafts if each.start is not None and one.start is None]
+        again = any(_same(draft[0].now, other) for other in (*known, *others))
         if not again and _fitting(score, least, found, each) and len(chosen) < BENT:
             known.append(draft[0].now)
             chosen.append((each, draft))
@@ -185,9 +187,12 @@ def _screened(
     # at the nodes, which all drafts by few share
     known = [] if found.unfolded >= UNFOLDED else [first[0].places()[likewise.few.nodes]]
     others = []
+    # where more vertices begin at the Möbius map they may end elsewhere than where they begin at given places
+    begun_alike: dict[bool, list[Floats]] = {True: [], False: []}
     for score, each, draft in drafts:
-        if not any(_same(draft.now, other) for other in known):
-            known.append(draft.now)
+        before = begun_alike[each.start is None]
+        if not any(_same(draft.now, other) for other in (*known, *before)):
+            before.append(draft.now)
             others.append((score, each))
     if not others:
         return []
