@@ -94,7 +94,9 @@ def reconsidered(
     # a map that could not be unfolded may be the right one all the same, and come out from another start
     known = [] if found.unfolded >= UNFOLDED else [first[0].now]
     for score, each, draft in drafts:
-        again = any(_same(draft[0].now, other) for other in known)
+        # where one from a Möbius map has come to the same, that is the one: its samples say more of it
+        others = [other[0].now for _, one, other in drafts if each.start is not None and one.start is None]
+        again = any(_same(draft[0].now, other) for other in (*known, *others))
         if not again and _fitting(score, least, found, each) and len(chosen) < BENT:
             known.append(draft[0].now)
             chosen.append((each, draft))
@@ -163,20 +165,16 @@ def _screened(
     return [each for score, each, _ in others if _fitting(score, least, found, each)]
 
 
-def _each_once(
-    drafts: list[tuple[float, Hypothesis, Draft]],
-) -> list[tuple[float, Hypothesis, Draft]]:
+def _each_once(drafts: list[tuple[float, Hypothesis, Draft]]) -> list[tuple[float, Hypothesis, Draft]]:
     """Return the drafts, best first, without those of a map that is among them already.
 
-    Of two of one map that stays whose beginning is given: a draft by more vertices begins there too.
+    One that begins at its Möbius map and one that begins at given places both stay: with more vertices they may part.
     """
     kept: list[tuple[float, Hypothesis, Draft]] = []
-    for score, each, draft in drafts:
-        again = next((k for k, other in enumerate(kept) if _same(draft.now, other[2].now)), None)
-        if again is None:
-            kept.append((score, each, draft))
-        elif kept[again][1].start is None and each.start is not None:
-            kept[again] = kept[again][0], each, draft
+    for one in drafts:
+        alike = [other for other in kept if (other[1].start is None) == (one[1].start is None)]
+        if not any(_same(one[2].now, other[2].now) for other in alike):
+            kept.append(one)
     return kept
 
 
