@@ -36,18 +36,6 @@ OPEN = 1.02
 does not fit worse by as much: a head that is nearly symmetric had 1.01, and was the mirrored one."""
 
 
-def needed(found: Alignment, other: Alignment) -> float:
-    """Return how much of the target another map has to make sure, at least, to be taken, or to be spoken of.
-
-    See `decided`: a map that fits may be taken beside one that makes more sure.
-    """
-    if other.mobius.reflected == found.mobius.reflected:
-        more = PROVED
-    else:
-        more = 1 / OPEN if other.mobius.reflected else OPPOSITE * FITS
-    return min(FITS, more * sure(found))
-
-
 def decided(bent: list[tuple[Alignment, str]]) -> Alignment:
     """Return the best of bent maps, the first of which is the search's best; mirrored only by proof."""
     plain = [one for one in bent if not one[0].mobius.reflected]

@@ -64,20 +64,13 @@ def _other_side(matched: Alignment, other: SearchResult) -> Alignment:
     return replace(matched, search=other, other=matched.search, rival=None, remarks=tuple(unproved(other)))
 
 
-def further(matched: Alignment, count: int, worth: Callable[[float], bool], clock: Part) -> Iterator[Hypothesis]:
-    """Yield so many further maxima of a search, each far from those before, as some thousand cells show them.
-
-    As long as they are `worth` it by the samples that match.
-    """
+def further(matched: Alignment, count: int, clock: Part) -> Iterator[Hypothesis]:
+    """Yield so many further maxima of a search, each far from those before, as some thousand cells show them."""
     known: list[Any] = [matched.search.mobius]
-    if matched.rival is not None and not worth(matched.rival.upper_bound):
-        return
     for number in range(count):
         part = clock.part(number / count, (number + 1) / count)
         part.begin("reconsider", "Trying another map", 0.0)
         rival = rival_of(matched, known, 0.0, part)
-        if not worth(rival.value):
-            return
         known.append(rival.mobius)
         behind = 100 * (matched.search.value - rival.value) / len(matched.source_samples)
         yield Hypothesis(

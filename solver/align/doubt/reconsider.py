@@ -1,9 +1,9 @@
 """Other maps that are tried, where the search's best is in doubt, until one of them can be taken (`decision`).
 
-Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Those of which the
-samples promise enough (`chances`) are drafted, by few vertices first, and given up there if another draft fits clearly
-better; what is left is bent like the first, and all are judged by the same calibrated measure: how much of the target
-is surely right (`Alignment.confidence`). A mirrored map has to be better than any other by more than chance.
+Hypotheses are the other orientation, further maxima of the search, and what a rigid pose implies. Each is drafted, by
+few vertices first, and given up there if another draft fits clearly better; what is left is bent like the first, and
+all are judged by the same calibrated measure: how much of the target is surely right (`Alignment.confidence`). A
+mirrored map has to be better than any other by more than chance.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from ..maps.dense import begun, bent_densely, drafted_from
 from ..result.alignment import Alignment
 from ..result.confidence import DOUBTFUL
 from ..surfaces.side_by_side import Work, side_by_side, stages_of
-from .chances import draft_may_reach, may_reach
-from .decision import FITS, decided, needed
+from .decision import FITS, decided
 from .hypotheses import SIDES, Hypothesis, apart, by_own_mirror, by_pose, further, roughly_unlike, turned, unlike
 from .opposite import with_sides_open
 
@@ -154,7 +153,6 @@ def _screened(
     clock.begin("reconsider", "Trying another map", 0.1)
     works = [partial(_roughly_drafted, each, likewise) for each in hypotheses]
     drafts = _in_order(side_by_side(works, clock.within(0.1, 1.0), threads=found.settings.threads != 1))
-    drafts = [one for one in drafts if draft_may_reach(one[1].alignment, one[2], needed(found, one[1].alignment))]
     if found.unfolded < UNFOLDED:  # else the right one may be the same, and be unfolded from another start
         before = first[0].places()[likewise.few.nodes]
         drafts = [one for one in drafts if not _same(one[2].now, before)]
@@ -197,9 +195,6 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
 
-    def worth(one: Alignment, samples: float) -> bool:
-        return may_reach(samples, len(one.source_samples), needed(found, one))
-
     turns: list[Hypothesis] = []
     works: list[Work[list[Hypothesis]]] = []
     other = turned(matched)
@@ -207,7 +202,7 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
         turns.append(Hypothesis(other, None, what))
     if other is not None and matched.mobius.reflected:
-        works.append(lambda note: list(further(other, MAXIMA - 1, partial(worth, other), stages_of(note))))
+        works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
         works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
         nodes = draft.few.nodes
@@ -217,8 +212,6 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
 
         works.append(lambda _: [one for one in (by_pose(matched, draft.onto, known),) if one is not None])
     if found.mean_confidence <= DOUBTFUL:
-        works.append(lambda note: list(further(matched, MAXIMA, partial(worth, matched), stages_of(note))))
+        works.append(lambda note: list(further(matched, MAXIMA, stages_of(note))))
     some = side_by_side(works, clock.within(0.0, 1.0), threads=found.settings.threads != 1)
-    tried = [*turns, *chain.from_iterable(some)]
-    # of sides that share little the samples of the whole match as little
-    return [each for each in tried if each.what == SIDES or worth(each.alignment, each.alignment.value)]
+    return [*turns, *chain.from_iterable(some)]
