@@ -8,7 +8,6 @@ from scipy.spatial import KDTree
 from ...surface.mesh import Booleans, Floats
 from ...surface.nearest import SurfacePoints
 from ...surface.sampling import spread
-from ..result.overlap import BEYOND, depth_beyond
 
 ASKED = 500
 """Points of the surface, about, of which it is asked where they are moved to."""
@@ -64,17 +63,21 @@ class OwnFit:
 
         What has its nearest point on a boundary may lie past it.
         """
-        other, facing, at_rim = self.onto.at(*self.onto.nearest_point(points, normals))
-        near_by = np.linalg.norm(other - points, axis=1) < near
-        return other, near_by & ((facing * normals).sum(axis=1) > ALONG) & ~at_rim
+        other, close, at_rim = self._asked(points, normals, near)
+        return other, close & ~at_rim
 
     def borne_out(self, points: Floats, normals: Floats, told: Booleans) -> tuple[float, float]:
         """Return which share of moved points lies on the surface: of those not past its boundaries, and of all.
 
         `told`, (q,): which points tell anything, as those do that the move does not leave where they are.
         """
-        beyond = np.zeros(len(points), bool)
-        if self.onto.loops:
-            beyond = depth_beyond(points, normals, self.onto) > BEYOND
-        lies = self.lying(points, normals, NEAR)[1] & ~beyond & told
-        return float(lies.sum() / max((told & ~beyond).sum(), 1)), float(lies.mean())
+        _, close, at_rim = self._asked(points, normals, NEAR)
+        inside = told & ~at_rim
+        lies = close & inside
+        return float(lies.sum() / max(inside.sum(), 1)), float(lies.mean())
+
+    def _asked(self, points: Floats, normals: Floats, near: float) -> tuple[Floats, Booleans, Booleans]:
+        """Return the nearest points, (q, 3), which are so near and face so, and which of them are on a boundary."""
+        other, facing, at_rim = self.onto.at(*self.onto.nearest_point(points, normals))
+        close = np.linalg.norm(other - points, axis=1) < near
+        return other, close & ((facing * normals).sum(axis=1) > ALONG), at_rim
