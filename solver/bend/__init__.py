@@ -3,6 +3,7 @@
 From a Möbius map come pose, scale and coarse bend; closest points and a plate that softens do the rest, without folds.
 """
 
-from .bend import Bending, Draft, bent, drafted, finished
+from .bend import Bending, bent, finished
+from .draft import Draft, drafted
 
 __all__ = ["Bending", "Draft", "bent", "drafted", "finished"]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...bend.bend import Draft, facing
 from ...bend.coarse import coarse
+from ...bend.draft import Draft, facing
 from ...bend.moments import posed
 from ...bend.pose import FAR, misfit
 from ...flatten.sphere import Flat

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...bend.bend import ready
+from ...bend.draft import ready
 from ...flatten.sphere import Flat
 from ..result.alignment import Alignment
 from ..surfaces.remark import Remark

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...bend.bend import facing, ready
+from ...bend.draft import facing, ready
 from ...bend.pose import HELD, POSE_SETTLED
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.sampling import spread

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...bend.bend import Draft
+from ...bend.draft import Draft
 from ...bend.plate import RIM_REACH
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats

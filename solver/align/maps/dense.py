@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...bend.bend import NODES, ROUNDS, Draft, drafted, finished
+from ...bend.bend import finished
+from ...bend.draft import NODES, ROUNDS, Draft, drafted
 from ...flatten.distortion import signed_areas
 from ...flatten.sphere import Flat
 from ...stages import Part

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...bend.bend import Draft, drafted, finished
+from ...bend.bend import finished
+from ...bend.draft import Draft, drafted
 from ...mobius import hyperbolic_distance
 from ...search.rival import ELSEWHERE
 from ...stages import Part

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ...bend.bend import Draft
+from ...bend.draft import Draft
 from ...bend.plate import RIM_REACH
 from ...flatten.sphere import Flat
 from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh

@@ -19,7 +19,8 @@ def test_a_turned_and_remeshed_surface_is_put_back(seed):
     """Whatever the pose: a round sheet, whose two long axes have nearly the same moment."""
     source = bumps(1500, seed=seed)
     target, kept = remeshed(posed(source, seed), 0.3, seed)
-    places, apart = in_best_pose(TriangleMesh(target.vertices / np.sqrt(target.area), target.faces), prepared(source))
+    onto = prepared(source)
+    places, apart = in_best_pose(TriangleMesh(target.vertices / np.sqrt(target.area), target.faces), onto, onto)
     expected = source.vertices[kept] / np.sqrt(source.area)
     assert np.linalg.norm(places - expected, axis=1).mean() < 0.01
     assert apart < 0.02
@@ -29,4 +30,4 @@ def test_the_mirror_image_lies_worse():
     source = bumps(1500, seed=1)
     onto = prepared(source)
     image = TriangleMesh(onto.mesh.vertices * [-1, 1, 1], onto.mesh.faces[:, ::-1])
-    assert in_best_pose(image, onto)[1] > 3 * in_best_pose(onto.mesh, onto)[1]
+    assert in_best_pose(image, onto, onto)[1] > 3 * in_best_pose(onto.mesh, onto, onto)[1]

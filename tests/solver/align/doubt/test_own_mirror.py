@@ -8,7 +8,7 @@ from solver import AlignSettings, TriangleMesh, align, prepare
 from solver.align.doubt.opposite import with_sides_open
 from solver.align.doubt.own_mirror import mirror_plane
 from solver.align.judgement import judge
-from solver.bend.bend import ready
+from solver.bend.draft import ready
 
 
 def sheet(seed: int, least: float = -0.45) -> TriangleMesh:

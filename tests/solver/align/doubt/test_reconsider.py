@@ -9,7 +9,7 @@ from solver.align.doubt.decision import MIRRORED, decided
 from solver.align.doubt.hypotheses import Hypothesis, by_pose
 from solver.align.doubt.reconsider import _screened, in_doubt
 from solver.align.maps.dense import drafted_from
-from solver.bend.bend import drafted
+from solver.bend.draft import drafted
 from solver.stages import Stages
 
 SMALL = AlignSettings(samples=60, targets=400, reflect="auto")
