@@ -16,7 +16,7 @@ from ...bend.pose import FAR, misfit
 from ...flatten.sphere import Flat
 from ...search.outcome import SearchResult
 from ...stages import Part
-from ...surface.mesh import Booleans, Floats, TriangleMesh
+from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
 from ...surface.topology import topology
 from ..maps.mobius_map import implied, improved, rival_of, taking, unproved, valued
@@ -157,11 +157,7 @@ def unlike(found: Alignment, draft: Draft, there: Booleans) -> float:
     if len(used) == 0:
         return np.inf
     face, barycentric = draft.located(found.target)
-    distance = descriptor_distance(
-        found.source, found.source_descriptors, found.target_descriptors[used], face[used], barycentric[used]
-    )
-    areas = found.target.mesh.vertex_areas[used]
-    return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
+    return _difference(found, used, face[used], barycentric[used], found.target.mesh.vertex_areas[used])
 
 
 def roughly_unlike(found: Alignment, draft: Draft) -> float:
@@ -171,9 +167,13 @@ def roughly_unlike(found: Alignment, draft: Draft) -> float:
         return np.inf
     nodes = TriangleMesh(draft.now, draft.flat.faces)
     face, barycentric = draft.onto.nearest_point(draft.now[some], nodes.vertex_normals()[some])
-    there = found.target_descriptors[draft.few.nodes[some]]
+    return _difference(found, draft.few.nodes[some], face, barycentric, draft.flat.vertex_areas[some])
+
+
+def _difference(found: Alignment, vertices: Integers, face: Integers, barycentric: Floats, areas: Floats) -> float:
+    """Return by how much descriptors of target vertices, (q,), differ from those of source points, by areas, (q,)."""
+    there = found.target_descriptors[vertices]
     distance = descriptor_distance(found.source, found.source_descriptors, there, face, barycentric)
-    areas = draft.flat.vertex_areas[some]
     return float(distance @ areas / areas.sum() / np.sqrt(found.source_descriptors.shape[1]))
 
 

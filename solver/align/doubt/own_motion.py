@@ -21,6 +21,7 @@ from ..result.agreement import descriptor_distance
 from ..result.alignment import Alignment
 from ..result.confidence import MATCHED, SURE
 from ..surfaces.remark import Remark
+from .decision import OPPOSITE
 from .own_fit import FAR, OwnFit
 
 ASKED, ROUGHLY_ASKED = 200, 100
@@ -42,8 +43,8 @@ BORNE_OUT = 0.75
 """Share of the moved points that lie on the source, of those not past its boundaries, from which on it may be alike
 there. Of 18 partial pairs of faces none has any such motion."""
 
-SHARE = 4 / 7
-"""Share that lies there, beside what is matched, from which on that is as likely: as of opposite sides (`OPPOSITE`)."""
+SHARE = OPPOSITE
+"""Share that lies there, beside what is matched, from which on that is as likely: as of opposite sides."""
 
 WRONG = 0.03
 """Share of the source's diagonal by which a map has to err to be called wrong."""

@@ -92,9 +92,10 @@ def reconsidered(
     chosen: list[tuple[Hypothesis, _Draft]] = []
     # a map that could not be unfolded may be the right one all the same, and come out from another start
     known = [] if found.unfolded >= UNFOLDED else [first[0].now]
+    from_mobius = [draft[0].now for _, each, draft in drafts if each.start is None]
     for score, each, draft in drafts:
         # where one from a Möbius map has come to the same, that is the one: its samples say more of it
-        others = [other[0].now for _, one, other in drafts if each.start is not None and one.start is None]
+        others = from_mobius if each.start is not None else []
         again = any(_same(draft[0].now, other) for other in (*known, *others))
         if not again and _fitting(score, least, found, each) and len(chosen) < BENT:
             known.append(draft[0].now)

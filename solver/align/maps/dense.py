@@ -16,8 +16,8 @@ from ..result.agreement import trust
 from ..result.alignment import Alignment, Overlap
 from ..result.overlap import piece, shared
 from ..surfaces.remark import Remark
-from .pieces import overlap_of
-from .stretched import agrees_better
+from .pieces import overlap_of, searched_alone
+from .stretched import agrees_better, shows_what_is_missing
 
 PARTIAL = 0.02
 """Share of either surface's area without a counterpart from which on the rest is cut out and aligned anew."""
@@ -71,7 +71,8 @@ def bent_densely(
     """Bend the target onto the source from a first draft; where they show different pieces, what they share."""
     source, target = found.source, found.target
     draft, here, there = first
-    cut = None
+    alone = None
+    searching = clock.part(0.2, 0.4, "overlap")
     if max(left_out(source, target, here, there)) > PARTIAL:
         clock.begin("overlap", "Finding the overlap", 0.2)
         still = clock.within(0.2, 0.2)
@@ -85,7 +86,7 @@ def bent_densely(
             if max(left_out(source, target, here == before[0], there == before[1])) < SETTLED:
                 break
         if max(left_out(source, target, here, there)) > PARTIAL:
-            cut = overlap_of(found, draft, piece(source, here), piece(target, there), clock, landmarks)
+            alone = searched_alone(found, piece(source, here), piece(target, there), searching, landmarks)
     remarks = found.remarks
     missing = left_out(source, target, here, there)
     if max(missing) > PARTIAL:
@@ -95,16 +96,16 @@ def bent_densely(
             if share > SETTLED
         )
         remarks += (Remark("partial", f"partial overlap: {apart} without a counterpart on the other surface"),)
-    shared_alone = None if cut is None else _of_overlap(found, cut[0], remarks)
-    if shared_alone is not None and cut is not None and cut[1]:
-        return shared_alone
-    share = 0.5 if cut is None else 0.8
-    clock.begin("bend", "Bending", share)
-    bending = finished(draft, source, target, progress=clock.within(share, 1.0))
+    if alone is not None and alone.sure:
+        return _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.4, 1.0)), remarks)
+    begin, end = (0.5, 1.0) if alone is None else (0.4, 0.7)
+    clock.begin("bend", "Bending", begin)
+    bending = finished(draft, source, target, progress=clock.within(begin, end))
     as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
-    if shared_alone is not None and agrees_better(shared_alone, as_wholes):
-        return shared_alone
-    return as_wholes
+    if alone is None or not shows_what_is_missing(as_wholes):
+        return as_wholes
+    shared_alone = _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.7, 1.0)), remarks)
+    return shared_alone if agrees_better(shared_alone, as_wholes) else as_wholes
 
 
 def _of_overlap(found: Alignment, overlap: Overlap, remarks: tuple[Remark, ...]) -> Alignment:

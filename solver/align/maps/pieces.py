@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -25,23 +25,31 @@ SMALLEST_OVERLAP = 0.1
 """Share of either surface's area below which an overlap is no ground to go on from."""
 
 
-def overlap_of(
-    found: Alignment,
-    draft: Draft,
-    source_part: Piece | None,
-    target_part: Piece | None,
-    clock: Part,
-    landmarks: Integers | None,
-) -> tuple[Overlap, bool] | None:
-    """Align the parts that the surfaces seem to share, by a draft of the whole; and whether it was surely not mistaken.
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What two surfaces seem to share, searched by itself.
 
-    None where they are too small.
+    Attributes
+    ----------
+    inner : Alignment
+    source_part, target_part : Piece
+    sure : bool
+        Whether its samples match better than those of the wholes, beyond chance.
     """
+
+    inner: Alignment
+    source_part: Piece
+    target_part: Piece
+    sure: bool
+
+
+def searched_alone(
+    found: Alignment, source_part: Piece | None, target_part: Piece | None, clock: Part, landmarks: Integers | None
+) -> Searched | None:
+    """Search the parts that the surfaces seem to share; None where they are too small."""
     if source_part is None or target_part is None:
         return None
-    source_share = source_part.mesh.area / found.source.mesh.area
-    target_share = target_part.mesh.area / found.target.mesh.area
-    if min(source_share, target_share) < SMALLEST_OVERLAP:
+    if min(_shares(found, source_part, target_part)) < SMALLEST_OVERLAP:
         return None
     settings = replace(
         found.settings,
@@ -61,30 +69,39 @@ def overlap_of(
             )
             for part in (source_part, target_part)
         )
-        searching = clock.part(0.2, 0.4, "overlap")
-        inner = searched(source, target, settings, searching, pairs)
+        inner = searched(source, target, settings, clock, pairs)
     except MeshError:  # too small a piece to flatten
         return None
-    sure = _surely_better(inner.matched_weights, found.matched_weights)
-    inner = challenged(inner, searching)
+    return Searched(inner, source_part, target_part, _surely_better(inner.matched_weights, found.matched_weights))
+
+
+def overlap_of(found: Alignment, draft: Draft, alone: Searched, searching: Part, clock: Part) -> Overlap:
+    """Bend what two surfaces share, by a draft of the whole."""
+    source_part, target_part = alone.source_part, alone.target_part
+    inner = challenged(alone.inner, searching)
     face, barycentric = draft.located(found.target)
     inner = _consistent(inner, source_part, face[target_part.vertices], barycentric[target_part.vertices])
 
-    clock.begin("bend", "Bending", 0.4)
+    clock.begin("bend", "Bending", 0.0)
     scale = np.sqrt(found.source.mesh.area / source_part.mesh.area)
     middle = draft.onto.mesh.vertices[source_part.vertices[inner.source.boundary]].mean(axis=0)
     start = scale * (draft.places()[target_part.vertices] - middle)
-    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.4, 0.5))
-    _, there = shared(again, inner.source, inner.target, clock.within(0.5, 0.5))
+    again = drafted(inner.mobius, inner.source, inner.target, start=start, progress=clock.within(0.0, 0.2))
+    _, there = shared(again, inner.source, inner.target, clock.within(0.2, 0.2))
     bending = finished(
         again,
         inner.source,
         inner.target,
         _alike(again, inner, source_part.cut, target_part.cut),
-        clock.within(0.5, 0.8),
+        clock.within(0.2, 1.0),
     )
     inner = replace(inner, bending=bending, counterpart=there)
-    return Overlap(inner, source_part, target_part, source_share, target_share, face, barycentric), sure
+    return Overlap(inner, source_part, target_part, *_shares(found, source_part, target_part), face, barycentric)
+
+
+def _shares(found: Alignment, source_part: Piece, target_part: Piece) -> tuple[float, float]:
+    """Return the shares of the surfaces' areas in the parts."""
+    return source_part.mesh.area / found.source.mesh.area, target_part.mesh.area / found.target.mesh.area
 
 
 def _surely_better(parts: Floats, whole: Floats) -> bool:

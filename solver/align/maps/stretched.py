@@ -13,15 +13,19 @@ EITHER_WAY = 1.96
 """Standard errors up to which chance may reach: two-sided, 95 %, as either map may be the better one."""
 
 
+def shows_what_is_missing(whole: Alignment) -> bool:
+    """Return whether a map of the wholes shows anything of what is missing, as one that is doubtful does not."""
+    return whole.mean_confidence > DOUBTFUL
+
+
 def agrees_better(cut: Alignment, whole: Alignment) -> bool:
     """Return whether descriptors agree better, beyond chance, by the map of what is shared than by that of the wholes.
 
     Asked of the target's points that the two put in different places: the mean of the differences in its standard
     errors, of as many points as stand for that area in the search. A map of pieces is free where one of the wholes is
-    held, so that it stretches less in any case, which does not count. Beside a map of the wholes that is doubtful
-    nothing is said: it shows nothing of what is missing.
+    held, so that it stretches less in any case, which does not count.
     """
-    if whole.mean_confidence <= DOUBTFUL:
+    if not shows_what_is_missing(whole):
         return False
     source, target = whole.source, whole.target
     both = np.flatnonzero((cut.confidence > 0) & (whole.confidence > 0))
