@@ -24,7 +24,7 @@ from .coarse import coarse
 from .draft import DRAFT_ROUNDS, ROUNDS, SOFTEST, STIFFEST, Draft, drafted, lengths
 from .least_moved import unfolded
 from .noise import shortest
-from .plate import SOLVER_STEPS, TENSION, relaxed
+from .plate import RIM_REACH, SOLVER_STEPS, TENSION, relaxed
 from .unfold_sphere import injective_on_sphere
 
 FINE_NODES = 6000
@@ -60,6 +60,7 @@ def finished(
     target: Flat,
     alike: Booleans | None = None,
     progress: Callable[[float], None] | None = None,
+    reach: float = RIM_REACH,
 ) -> Bending:
     """Bend a draft the rest of the way.
 
@@ -73,6 +74,8 @@ def finished(
         along which the target alone was cut. Default: all.
     progress : callable, optional
         Called with the share of the work done, in [0, 1]; may raise to end it.
+    reach : float
+        How far boundaries are drawn to each other, in roots of the source's area.
 
     Returns
     -------
@@ -86,7 +89,7 @@ def finished(
     order = [0, 2, 1] if (draft.whole.faces != target.mesh.faces).any() else [0, 1, 2]
     finest = max(FINEST, shortest(source, target))
     waves = np.maximum(lengths(STIFFEST, SOFTEST, ROUNDS)[DRAFT_ROUNDS:], finest)
-    taut = partial(relaxed, tension=TENSION, steps=SOLVER_STEPS)
+    taut = partial(relaxed, tension=TENSION, steps=SOLVER_STEPS, reach=reach)
     now = taut(draft.rest, draft.now, flat.faces, onto, waves, drawn[few.nodes], lambda share: tell(0.5 * share))
 
     tell(0.5)

@@ -30,6 +30,12 @@ RIM_REACH = 0.03
 """How far boundaries attract each other: the error that Möbius maps have, so that boundaries cut alike are found and
 others leave each other alone. Without it errors are 15 to 50 % larger where boundaries correspond."""
 
+CUT_REACH = 0.005
+"""The same where some of either surface lies past the other's boundary, so that not all boundaries correspond: those
+that do a draft puts within 0.01 of each other (`overlap.BEYOND`), where the pull has fallen to e^-2. Faces seen by a
+camera then err half as much, and others that are cut no more; reliefs and feet, whose boundaries correspond though they
+have much farther to go, err a quarter to twice as much more."""
+
 TENSION = 0.2
 """Wavelength over 2 pi, in roots of the area, from which on the plate resists like a membrane. Measured: with this the
 true displacements of surfaces in pose, by their power in the first 60 modes of the Laplacian, are likeliest: 0.08 on
@@ -48,12 +54,14 @@ SETTLED = 1e-3
 teeth and brains by a hundredth more, and it takes a third longer."""
 
 
-def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn: Booleans) -> tuple[Floats, Floats]:
+def pulls(
+    x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn: Booleans, reach: float = RIM_REACH
+) -> tuple[Floats, Floats]:
     """Return how the source pulls at each vertex: stiffness, (n, 3, 3), and force, (n, 3), of a spring.
 
     Towards the tangent plane of the point that suits in position and normal; less if the normals differ or the distance
     is an outlier, not at all where that point is on the edge.
-    Vertices on a boundary that are `drawn`, (n,), are pulled to the source's boundary too, if it is near.
+    Vertices on a boundary that are `drawn`, (n,), are pulled to the source's boundary too, if it is within `reach`.
     """
     mesh = TriangleMesh(x, faces)
     weight, normal, distance = planes(x, mesh.vertex_normals(), areas, onto)
@@ -65,7 +73,7 @@ def pulls(x: Floats, faces: Integers, areas: Floats, onto: SurfacePoints, drawn:
     if not len(rim):
         return stiffness, force
     point, tangent = onto.nearest_on_boundary(x[rim])
-    weight = areas[rim] * np.exp(-(((point - x[rim]) ** 2).sum(axis=1) / RIM_REACH**2) / 2)
+    weight = areas[rim] * np.exp(-(((point - x[rim]) ** 2).sum(axis=1) / reach**2) / 2)
     across = weight[:, None, None] * np.eye(3) - _along(tangent, weight * (1 - SLIP))
     stiffness[rim] += across
     force[rim] += np.einsum("nij,nj->ni", across, point - x[rim])
@@ -96,12 +104,13 @@ def relaxed(
     tell: Callable[[float], None],
     tension: float = np.inf,
     steps: int = DRAFT_STEPS,
+    reach: float = RIM_REACH,
 ) -> Floats:
     """Return the vertices, (n, 3), bent from `rest` onto the source, beginning at `now`.
 
     Each round minimises the energy of the springs (`pulls`) plus l^4 times the integral of the squared Laplacian of
     the displacement from `rest`, and of its squared gradient over `tension`^2, for l in `lengths`: a plate under
-    tension. Boundary vertices that are `drawn` go to the source's boundaries.
+    tension. Boundary vertices that are `drawn` go to the source's boundaries within `reach`.
     """
     mesh = TriangleMesh(rest, faces)
     stiffness, areas = laplacian(mesh), mesh.vertex_areas / mesh.area
@@ -111,7 +120,7 @@ def relaxed(
     for k, length in enumerate(lengths):
         tell(k / len(lengths))
         stiff = length**4
-        pull, force = pulls(rest + shift, faces, areas, onto, drawn)
+        pull, force = pulls(rest + shift, faces, areas, onto, drawn, reach)
         # the same system with the same pull in all directions, which one factorisation solves
         even = np.einsum("nii->n", pull) / 3 + 1e-4 * areas
         shift = _conjugate_gradients(

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from ...bend.bend import finished
 from ...bend.draft import Draft, drafted
+from ...bend.plate import CUT_REACH
 from ...mobius import hyperbolic_distance
 from ...search.rival import ELSEWHERE
 from ...stages import Part
@@ -94,6 +95,7 @@ def overlap_of(found: Alignment, draft: Draft, alone: Searched, searching: Part,
         inner.target,
         _alike(again, inner, source_part.cut, target_part.cut),
         clock.within(0.2, 1.0),
+        CUT_REACH,
     )
     inner = replace(inner, bending=bending, counterpart=there)
     return Overlap(inner, source_part, target_part, *_shares(found, source_part, target_part), face, barycentric)

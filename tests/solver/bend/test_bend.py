@@ -3,7 +3,10 @@ import pytest
 from scans import bumps, mirrored, percent, posed, remeshed, shuffled
 
 from solver import Flattening, Mobius, TriangleMesh, flatten
-from solver.bend.bend import bent
+from solver.align.result.overlap import piece
+from solver.bend.bend import bent, finished
+from solver.bend.draft import drafted
+from solver.bend.plate import CUT_REACH, RIM_REACH
 from solver.bend.unfold import in_order, injective, mean_value_weights
 from solver.flatten.distortion import signed_areas
 from solver.flatten.locate import TriangulatedDisc
@@ -48,6 +51,26 @@ def test_a_smooth_deformation_is_followed_without_folds(source, reflected):
     areas = signed_areas(found.carried, target.mesh.faces)
     assert (areas * (-1 if reflected else 1) > 0).all()
     assert np.median(found.offset) < 0.01
+
+
+def test_a_strip_that_is_missing_stays_missing_where_boundaries_hardly_reach(source):
+    """A twentieth of its width cut off, less on one side: drawn to the other's edge unless that reaches less far."""
+    within = np.linalg.norm(source.mesh.vertices[:, :2], axis=1) < 0.93 + 0.05 * source.mesh.vertices[:, 0]
+    part = piece(source, within)
+    assert part is not None
+    mesh, vertex = remeshed(posed(part.mesh, 1), 0.8, 2)
+    target, own = flatten(mesh), part.vertices[vertex]
+    mobius = onto(source.disc[own], target.disc)
+    draft = drafted(mobius, source, target)
+    near, far = (
+        percent(
+            places(finished(draft, source, target, reach=reach).carried, source),
+            source.mesh.vertices[own],
+            source.mesh,
+        ).mean()
+        for reach in (CUT_REACH, RIM_REACH)
+    )
+    assert near < 0.5 * far
 
 
 def test_itself_stays_itself(source):
