@@ -16,8 +16,8 @@ def test_a_ball_is_alike_everywhere_but_where_its_boundary_is_felt() -> None:
     inside = felt_inside(depth)[:, :4]
     off = np.abs(measured / np.median(np.where(inside, measured, np.nan)[inside[:, 3]], axis=0) - 1)
     for k in range(4):
-        assert off[inside[:, k], k].max() < 0.25
-        assert off[~inside[:, k], k].max() > 0.4  # at the boundary about half of what diffuses in is missing
+        assert off[inside[:, k], k].max() < 0.2
+        assert off[~inside[:, k], k].max() > 0.3  # beside a boundary up to half of what would diffuse in is missing
 
 
 def test_what_differs_is_counted_where_it_tells_anything() -> None:
