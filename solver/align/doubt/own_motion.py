@@ -23,7 +23,7 @@ from ..result.confidence import MATCHED, SURE
 from ..surfaces.remark import Remark
 from .decision import OPPOSITE
 from .deep_inside import depths, difference, explained, felt_inside, interpolated
-from .likely_motion import BORNE_OUT, LEAST, Likely
+from .likely_motion import BORNE_OUT, ELSEWHERE, LEAST, Likely
 from .own_fit import FAR, OwnFit
 
 ASKED = 200
@@ -34,9 +34,6 @@ ROUNDS, FIRST = 10, 3
 
 SHARE = OPPOSITE
 """Share that lies there, beside what is matched, from which on that is as likely: as of opposite sides."""
-
-WRONG = 0.03
-"""Share of the source's diagonal by which a map has to err to be called wrong."""
 
 ALIKE = 0.05
 """Share of their spread by which descriptors may differ more where two places are called alike, beside chance: it is
@@ -123,7 +120,8 @@ def motions(found: Alignment) -> Iterator[Motion]:
         there, up = points @ turn.T + shift, normals @ turn.T
         moved = np.linalg.norm(there - points, axis=1)
         borne_out, share = own.borne_out(there, up, np.ones(len(points), bool))
-        if borne_out < BORNE_OUT or share < LEAST * matched.mean() or moved.mean() < WRONG * diagonal:
+        back = moved.mean() < ELSEWHERE / 2  # slid to where it was, as smooth things do
+        if back or borne_out < BORNE_OUT or share < LEAST * matched.mean():
             continue
         both = own.lying(there, up, FAR)[1] & matched
         elsewhere = own.onto.nearest_point(there, up)
