@@ -106,18 +106,19 @@ class Likely:
             for end in ends:
                 turn = _frame(self.own.normals[end]) @ spins @ here.T
                 shift = self.own.points[end] - points[begin] @ turn.transpose(0, 2, 1)
-                moved = np.einsum("kij,qj->kqi", turn, some) + shift[:, None]
-                lies, beyond, near = self.own.roughly(moved, np.einsum("kij,qj->kqi", turn, facing))
+                moved = some @ turn.transpose(0, 2, 1) + shift[:, None]
+                lies, beyond, near = self.own.roughly(moved, facing @ turn.transpose(0, 2, 1))
                 lies &= ~beyond
-                borne_out = lies.sum(axis=1) / np.maximum((~beyond).sum(axis=1), 1)
-                elsewhere = np.linalg.norm(moved - some, axis=2).mean(axis=1) > ELSEWHERE
-                worth = np.where(elsewhere, borne_out * lies.mean(axis=1), 0.0)
-                if alike:
-                    worth *= borne_out**3
-                    some_of = worth >= least  # no more than all can be found again
-                    there = near[some_of]
-                    tells = felt_inside(np.minimum(depth, deep[there])) & lies[some_of, :, None]
-                    worth[some_of] *= explained(wanted, wanted - descriptors[there], tells)
+                lying, told = np.count_nonzero(lies, axis=1), np.count_nonzero(~beyond, axis=1)
+                borne_out = lying / np.maximum(told, 1)
+                worth = lying / len(some) * borne_out ** (4 if alike else 1)
+                rows = np.flatnonzero(worth >= least)
+                elsewhere = np.linalg.norm(moved[rows] - some, axis=2).mean(axis=1) > ELSEWHERE
+                worth[rows[~elsewhere]] = 0
+                if alike:  # no more than all can be found again
+                    rows = rows[elsewhere]
+                    tells = felt_inside(np.minimum(depth, deep[near[rows]])) & lies[rows, :, None]
+                    worth[rows] *= explained(wanted, wanted - descriptors[near[rows]], tells)
                 worths.append(worth)
                 turns.append(turn)
                 shifts.append(shift)
@@ -129,7 +130,7 @@ class Likely:
             if worth[first] < least:
                 return
             yield turn[first], shift[first]
-            moved = np.einsum("kij,qj->kqi", turn, some[::10]) + shift[:, None]
+            moved = some[::10] @ turn.transpose(0, 2, 1) + shift[:, None]
             worth[np.linalg.norm(moved - moved[first], axis=2).mean(axis=1) < ELSEWHERE / 2] = 0
 
 
