@@ -151,18 +151,22 @@ def _of_main_parts(
         found = bent_densely(matched, first, part, pairs)
         other = turned_round(found, source, target, clock.part(0.95, 0.96), pairs)
         rim = None if other else with_other_rim(found, source, target, clock.part(0.96, 0.97), pairs)
+        decided = settings.take_rival or pairs is not None  # by the user
         if other is not None:
             found, target = other
         elif rim is not None:
             found, source, target = rim
-        elif not settings.take_rival and pairs is None:  # these decide
-            found = with_motions_open(reconsidered(found, matched, first, clock.part(0.97, 1)))
-            if found.mean_confidence <= DOUBTFUL and settings.cut and all(map(deep, (source, target))):
-                again = like_pieces(source, target, settings, clock.part(0.97, 0.98))
-                if again is not None:
-                    cut, used = _of_main_parts(again[0], again[1], settings, clock.part(0.98, 1.0), None)
-                    if cut.mean_confidence > DOUBTFUL:
-                        return cut.annotated(remarks=(*joined, *again[2], *cut.remarks)), used
+        elif not decided:
+            found = reconsidered(found, matched, first, clock.part(0.97, 1))
+        if not decided:
+            found = with_motions_open(found)
+        unfit = not (decided or other or rim) and found.mean_confidence <= DOUBTFUL
+        if unfit and settings.cut and all(map(deep, (source, target))):
+            again = like_pieces(source, target, settings, clock.part(0.97, 0.98))
+            if again is not None:
+                cut, used = _of_main_parts(again[0], again[1], settings, clock.part(0.98, 1.0), None)
+                if cut.mean_confidence > DOUBTFUL:
+                    return cut.annotated(remarks=(*joined, *again[2], *cut.remarks)), used
     return found.annotated(remarks=(*joined, *said, *found.remarks)), (source, target)
 
 

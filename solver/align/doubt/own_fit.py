@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...surface.mesh import Booleans, Floats
+from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.nearest import SurfacePoints
 from ...surface.sampling import spread
 
@@ -28,8 +28,10 @@ class OwnFit:
 
     Attributes
     ----------
+    some : (q,) int
+        About `ASKED` of its vertices, evenly spread.
     points, normals : (q, 3) float64
-        About `ASKED` of its vertices, evenly spread, and the unit normals there.
+        Where they are, and the unit normals there.
     """
 
     def __init__(self, onto: SurfacePoints) -> None:
@@ -37,7 +39,7 @@ class OwnFit:
         mesh, normals = onto.mesh, onto.normals
         used = np.flatnonzero(mesh.used)
         some = used[spread(mesh.vertices[used], ASKED)] if len(used) > ASKED else used
-        self.points, self.normals = mesh.vertices[some], normals[some]
+        self.some, self.points, self.normals = some, mesh.vertices[some], normals[some]
         low, high = mesh.vertices[used].min(axis=0), mesh.vertices[used].max(axis=0)
         size = float((high - low).max()) / CELLS
         self._low, self._size = low - size, size
@@ -48,15 +50,18 @@ class OwnFit:
         if onto.loops:
             self._rim[np.concatenate(onto.loops)] = True
 
-    def roughly(self, points: Floats, normals: Floats) -> tuple[Booleans, Booleans]:
-        """Return which points, (..., 3), lie about on the surface, and which may lie past a boundary, by the cells."""
+    def roughly(self, points: Floats, normals: Floats) -> tuple[Booleans, Booleans, Integers]:
+        """Return which points, (..., 3), lie about on the surface, which may lie past a boundary, and vertices nearby.
+
+        By the cells.
+        """
         cell = np.floor((points - self._low) / self._size).astype(np.intp)
         cell = np.clip(cell, 0, self._shape - 1)
         near = self._near[(cell[..., 0] * self._shape[1] + cell[..., 1]) * self._shape[2] + cell[..., 2]]
         apart = points - self.onto.mesh.vertices[near]
         close = (apart * apart).sum(axis=-1) < ROUGHLY_NEAR**2
         lying = close & ((normals * self.onto.normals[near]).sum(axis=-1) > ROUGHLY_ALONG)
-        return lying, self._rim[near]
+        return lying, self._rim[near], near
 
     def lying(self, points: Floats, normals: Floats, near: float) -> tuple[Floats, Booleans]:
         """Return the nearest points of the surface, (q, 3), and which points lie so near, and as it faces there.

@@ -94,7 +94,7 @@ def _likely(own: OwnFit) -> Iterator[tuple[Floats, Floats]]:
         offsets = np.arange(least, most, BETWEEN)
         away = along - offsets[:, None]
         image = points - 2 * away[..., None] * normal
-        lies, beyond = own.roughly(image, np.broadcast_to(_turned(facing, normal), image.shape))
+        lies, beyond, _ = own.roughly(image, np.broadcast_to(_turned(facing, normal), image.shape))
         told = (np.abs(away) > ASIDE) & ~beyond
         lies &= told
         shares.append(np.stack([lies.sum(axis=1) / np.maximum(told.sum(axis=1), 1), lies.mean(axis=1)]))
