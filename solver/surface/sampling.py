@@ -128,12 +128,16 @@ def spread(points: Floats, count: int) -> Integers:
 
     Straight distances: for points, (n, 3), that only have to be spread evenly, much faster than along a surface.
     """
-    square = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
-    chosen = [int(np.argmax(square))]
-    square = ((points - points[chosen[0]]) ** 2).sum(axis=1)
+    x, y, z = columns = np.ascontiguousarray(points.T)
+
+    def squares(a: float, b: float, c: float) -> Floats:
+        return (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
+
+    chosen = [int(np.argmax(squares(*points.mean(axis=0))))]
+    square = squares(*columns[:, chosen[0]])
     while len(chosen) < min(count, len(points)):
         chosen.append(int(np.argmax(square)))
-        np.minimum(square, ((points - points[chosen[-1]]) ** 2).sum(axis=1), out=square)
+        np.minimum(square, squares(*columns[:, chosen[-1]]), out=square)
     return np.array(chosen, dtype=np.intp)
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
 
 from ...surface.mesh import Booleans, Floats, Integers
@@ -18,6 +21,10 @@ move is sought, and at last."""
 
 CELLS = 40
 """Cells along the longest side of a box about the surface, in each of which the vertex next to its middle is known."""
+
+BESIDE = 4
+"""Cells from one with a vertex in it within which the vertex next to a cell's middle is sought; farther away, where no
+point lies on the surface, one of the next cell with any is taken, in a tenth of the time."""
 
 ROUGHLY_NEAR, ROUGHLY_ALONG = 0.06, 0.8
 """As `NEAR` and `ALONG` where cells answer and moves are some degrees apart: `FAR`, and half a cell of a sheet's."""
@@ -44,8 +51,7 @@ class OwnFit:
         size = float((high - low).max()) / CELLS
         self._low, self._size = low - size, size
         self._shape = np.ceil((high - low) / size).astype(np.intp) + 2
-        middles = np.indices(tuple(self._shape)).reshape(3, -1).T * size + self._low + size / 2
-        self._near = used[KDTree(mesh.vertices[used]).query(middles)[1]]
+        self._near = self._nearby(used)
         self._rim = np.zeros(len(mesh.vertices), bool)
         if onto.loops:
             self._rim[np.concatenate(onto.loops)] = True
@@ -55,13 +61,29 @@ class OwnFit:
 
         By the cells.
         """
-        cell = np.floor((points - self._low) / self._size).astype(np.intp)
-        cell = np.clip(cell, 0, self._shape - 1)
-        near = self._near[(cell[..., 0] * self._shape[1] + cell[..., 1]) * self._shape[2] + cell[..., 2]]
+        near = self._near[self._cells(points)]
         apart = points - self.onto.mesh.vertices[near]
-        close = (apart * apart).sum(axis=-1) < ROUGHLY_NEAR**2
-        lying = close & ((normals * self.onto.normals[near]).sum(axis=-1) > ROUGHLY_ALONG)
+        close = np.einsum("...k,...k->...", apart, apart) < ROUGHLY_NEAR**2
+        lying = close & (np.einsum("...k,...k->...", normals, self.onto.normals[near]) > ROUGHLY_ALONG)
         return lying, self._rim[near], near
+
+    def _cells(self, points: Floats) -> Integers:
+        """Return in which cells points, (..., 3), are, or next to which if they are outside."""
+        cell = np.clip(((points - self._low) / self._size).astype(np.intp), 0, self._shape - 1)
+        return (cell[..., 0] * self._shape[1] + cell[..., 1]) * self._shape[2] + cell[..., 2]
+
+    def _nearby(self, used: Integers) -> Integers:
+        """Return of each cell the vertex, of those in use, (q,), next to its middle, or about so if all are far."""
+        vertices = self.onto.mesh.vertices[used]
+        near = np.full(self._shape.prod(), -1)
+        near[self._cells(vertices)] = used
+        full: Any = distance_transform_edt(near.reshape(self._shape) < 0, return_indices=True)
+        away, at = full  # which its stubs do not know
+        near = near[np.ravel_multi_index(tuple(at), tuple(self._shape))].ravel()
+        beside = np.flatnonzero(away.ravel() < BESIDE)
+        middles = np.stack(np.unravel_index(beside, tuple(self._shape)), axis=1) * self._size + self._low
+        near[beside] = used[KDTree(vertices).query(middles + self._size / 2)[1]]
+        return near
 
     def lying(self, points: Floats, normals: Floats, near: float) -> tuple[Floats, Booleans]:
         """Return the nearest points of the surface, (q, 3), and which points lie so near, and as it faces there.

@@ -104,13 +104,18 @@ def bent_densely(
     clock.begin("bend", "Bending", begin)
     found = replace(found, counterpart=there, remarks=remarks)
     as_wholes = _of_wholes(found, draft, RIM_REACH, clock.within(begin, end))
-    if max(missing) > SETTLED:  # boundaries that do not lie on each other everywhere may not be the same
-        freer = _of_wholes(found, draft, CUT_REACH, clock.within(end, end))
-        as_wholes = freer if agrees_better(freer, as_wholes) else as_wholes
-    if alone is None or not shows_what_is_missing(as_wholes):
+    if not shows_what_is_missing(as_wholes):
         return as_wholes
-    shared_alone = _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.7, 1.0)), remarks)
-    return shared_alone if agrees_better(shared_alone, as_wholes) else as_wholes
+    if alone is not None:
+        shared_alone = _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.7, 1.0)), remarks)
+        if agrees_better(shared_alone, as_wholes):
+            return shared_alone
+    if max(missing) > SETTLED:
+        # boundaries that do not lie on each other everywhere may not be the same
+        freer = _of_wholes(found, draft, CUT_REACH, clock.within(end, end))
+        if agrees_better(freer, as_wholes):
+            return freer
+    return as_wholes
 
 
 def _of_wholes(found: Alignment, draft: Draft, reach: float, tell: Callable[[float], None]) -> Alignment:
