@@ -21,7 +21,7 @@ from ..results import pattern_color, read_layout, require_room, write_color
 from ..textures.preview import preview_settings, show_preview
 from ..textures.writing import has_pictures
 from ..translation import told
-from ..usable import why_not_aligned, why_not_object_mode
+from ..usable import is_read_only, why_not_aligned, why_not_object_mode
 from .transfer import read_through
 
 GAP = 0.15
@@ -139,7 +139,9 @@ def show_after(context: bpy.types.Context, source: bpy.types.Object, target: bpy
     how = kept.after_align if kept is not None else "side_by_side"
     if how == "nothing" or viewport.space_of(context) is None:
         return
-    if how == "pattern":
+    if is_read_only(source):  # it cannot be painted, and is seen where it is
+        context.window_manager.mobius_view.matches = True
+    elif how == "pattern":
         paint(source, target)
         viewport.show_colors(context)
     else:

@@ -30,7 +30,7 @@ PICTURES = {
     "following": ("empties-missing", "empties", "live", "swapped", "discs-opened", "discs-closed"),
     "surroundings": (
         *("example", "search", "light", "large-scale", "large-scale-german", "narrow-german", "narrow"),
-        *("weight-paint", "sculpt", "two-windows", "in-the-way", "mended", "linked"),
+        *("weight-paint", "sculpt", "two-windows", "in-the-way", "mended", "linked", "linked-source"),
     ),
     "large": ("large", "large-searching", "large-side-by-side", "large-transferred"),
     "expressions": ("expressions-aligned", "expressions-0", "expressions-1", "expressions-ended"),
