@@ -12,6 +12,7 @@ GERMAN = {
     "'{}' is in {} Mode: switch to Object Mode first": "„{}“ ist im {}-Modus: Zuerst in den Objektmodus wechseln",
     "'{}' is linked from another file: make it local first (Object > Relations > Make Local > Selected Objects and Data)": "„{}“ ist aus einer anderen Datei verknüpft: Zuerst lokal machen (Objekt > Beziehungen > Lokal machen > Ausgewählte Objekte und Daten)",
     "'{}' is linked from another file: Align only reads it, and writes on the target alone": "„{}“ ist aus einer anderen Datei verknüpft: Ausrichten liest nur davon und schreibt allein auf das Ziel",
+    "'{}' is linked from another file: the shared layout and colors stay as Align left them": "„{}“ ist aus einer anderen Datei verknüpft: Die gemeinsame UV-Map und die Farben bleiben, wie Ausrichten sie geschrieben hat",
     "'{}' is linked from another file and only read: the shared layout and colors are on the target alone": "„{}“ ist aus einer anderen Datei verknüpft und wurde nur gelesen: Die gemeinsame UV-Map und die Farben sind allein auf dem Ziel",
     "'{}' is a collection instance: select it and make its meshes real (Object > Apply > {})": "„{}“ ist eine Sammlungsinstanz: Auswählen und deren Meshes real machen (Objekt > Anwenden > {})",
     "'{}' is no mesh: convert it (Object > Convert > Mesh) or choose another {}": "„{}“ ist kein Mesh: Umwandeln (Objekt > Konvertieren > Mesh) oder ein anderes {} wählen",

@@ -14,7 +14,7 @@ from .. import point_pairs
 from ..jobs import redraw, why_busy
 from ..mesh_data import Refusal
 from ..translation import told
-from ..usable import why_not_aligned
+from ..usable import is_read_only, why_not_aligned
 
 
 class _OfPairs:
@@ -45,6 +45,9 @@ class _OfPairs:
         except (Refusal, MeshError) as error:
             self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
+        if is_read_only(settings.source):
+            text = rpt_("'{}' is linked from another file: the shared layout and colors stay as Align left them")
+            self.report({"WARNING"}, text.format(settings.source.name))
         kind, said = point_pairs.describe(*done)
         self.report({kind}, said)
         redraw(context)

@@ -10,6 +10,7 @@ from scenes import QUICK, corner_values, everything, make_sheet, weights
 
 bpy = pytest.importorskip("bpy", reason="Blender's module bpy is not installed")
 
+from mathutils import Vector  # noqa: E402
 from mobius_extension.mobius_addon import stored_alignment  # noqa: E402
 from mobius_extension.mobius_addon.mesh_data import read_surface  # noqa: E402
 
@@ -117,6 +118,22 @@ def test_one_undo_takes_it_back_and_what_paints_both_refuses(shot: Any) -> None:
     assert [obj.name for obj in shot()] == names
     assert everything(shot()[1]) == before
     assert not shot()[1].data.mobius_alignment.target_fingerprint
+
+
+def test_a_point_pair_bends_the_map_and_says_that_the_layout_does_not_follow(
+    shot: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source, target = shot()
+    bpy.ops.mobius.align(**QUICK)
+    before, there = everything(source), bytes(target.data.mobius_alignment.packed)
+    layout = corner_values(target, "Mobius")
+    place = source.data.vertices[84].co + Vector((0.02, 0, 0))
+    point = min((v.co for v in target.data.vertices), key=lambda co: (co - source.data.vertices[84].co).length)
+    assert bpy.ops.mobius.add_pair(source_point=place, target_point=point, follow_all=True) == {"FINISHED"}
+    assert "the shared layout and colors stay as Align left them" in capfd.readouterr().out
+    assert bytes(target.data.mobius_alignment.packed) != there
+    assert np.array_equal(layout, corner_values(target, "Mobius"))
+    assert everything(source) == before
 
 
 def test_several_targets_and_the_one_step_transfer(shot: Any) -> None:
