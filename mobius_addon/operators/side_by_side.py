@@ -14,7 +14,7 @@ from ...solver.surface.mesh import Complexes, Floats
 from .. import comparison, stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..comparison import add, copies, end, is_shown
-from ..mesh_data import Refusal, Surface, read_surface, seen_positions
+from ..mesh_data import Refusal, Surface, read_surface, seen_positions, settle
 from ..options import transfer_settings
 from ..preferences import preferences
 from ..results import pattern_color, read_layout, require_room, write_color
@@ -45,6 +45,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Paint both meshes and put copies beside each other."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         try:
             surfaces, found = show(context, source, target)

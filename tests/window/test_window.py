@@ -27,6 +27,7 @@ PICTURES = {
     ),
     "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
     "pairing": ("point-pairs",),
+    "fitting": ("fitted", "redo-fitted"),
     "following": ("empties-missing", "empties", "live", "swapped", "discs-opened", "discs-closed"),
     "surroundings": (
         *("example", "search", "light", "large-scale", "large-scale-german", "narrow-german", "narrow"),
