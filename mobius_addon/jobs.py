@@ -23,7 +23,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver import Cancelled, MeshError, Progress
 from .job import Job, Refused, Work, describe_left, describe_proof
-from .mesh_data import Refusal
+from .mesh_data import Refusal, settle
 from .registration import register_factory
 from .translation import told
 from .usable import by_uid, why_not_now
@@ -68,6 +68,7 @@ class JobOperator:
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Do the work: at once for a script and for the redo panel, in the background for a person."""
         self._scene = context.scene.session_uid
+        settle(context)
         in_window = not bpy.app.background and self.options.is_invoke
         if in_window and self.options.is_repeat_last:
             return self._invoke_anew()

@@ -133,6 +133,14 @@ def _mixed_keys(mesh: bpy.types.Mesh) -> Floats | None:
     return np.concatenate([*mixed], axis=1)
 
 
+def settle(context: bpy.types.Context) -> None:
+    """Have objects be where they are: the redo panel undoes, and until they are evaluated anew all lie at the origin.
+
+    An operator that reads a place, or whether an object is mirrored, begins with this.
+    """
+    context.view_layer.update()
+
+
 def in_world(obj: bpy.types.Object) -> Floats:
     """Return the places of a mesh object's vertices in the world, (n, 3)."""
     own = read_vertices(obj.data)

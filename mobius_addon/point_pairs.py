@@ -21,6 +21,7 @@ from .attributes import LIVE_FACE, SHARED_COLOR, SHARED_LAYOUT, restored_on_fail
 from .landmarks import paired_empties
 from .live import write_map
 from .mesh_data import Surface, foreach, mirrored, read_surface
+from .usable import is_read_only
 
 COLLECTION = "Mobius Pairs"
 
@@ -191,6 +192,10 @@ def _write(
 ) -> None:
     """Keep a map on the target, and have its shared layout, its colors and what it follows live show it."""
     stored_alignment.keep_bent(target, found, None if about is None else json.dumps(about))
+    if LIVE_FACE in target.data.attributes:
+        write_map(target, surfaces[0], found)
+    if is_read_only(source):  # it has no layout and colors of this alignment
+        return
     layers = source.data.uv_layers.get(SHARED_LAYOUT), target.data.uv_layers.get(SHARED_LAYOUT)
     if None not in layers:
         disc = _carried(foreach(layers[0].uv, "vector", 2, np.float32), surfaces[0], surfaces[1].mesh, found)
@@ -199,8 +204,6 @@ def _write(
     if None not in colors and len(colors[0].data) == len(surfaces[0].mesh.vertices):
         own = foreach(colors[0].data, "color", 4, np.float32)
         results.write_color(target, SHARED_COLOR, interpolate(found, own), found.face >= 0)
-    if LIVE_FACE in target.data.attributes:
-        write_map(target, surfaces[0], found)
 
 
 def _carried(

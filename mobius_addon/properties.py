@@ -24,6 +24,13 @@ def _names_to_sample(settings: bpy.types.PropertyGroup, _context: bpy.types.Cont
     return [] if source is None or source.type != "MESH" else samplable(source)
 
 
+def _source_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Forget the name of what the target follows where another source has nothing of that name."""
+    names = _names_to_sample(settings, context, "")
+    if settings.live_attribute and settings.source is not None and settings.live_attribute not in names:
+        settings.property_unset("live_attribute")
+
+
 class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.PropertyGroup):
     """What a person chose in the panel; one per scene."""
 
@@ -32,6 +39,7 @@ class MobiusSettings(AlignOptions, ScanOptions, TransferOptions, bpy.types.Prope
         description="Mesh to carry data from",
         type=bpy.types.Object,
         poll=_is_choosable,
+        update=_source_changed,
     )
     target: bpy.props.PointerProperty(
         name="Target",

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import comparison, stored_alignment
@@ -33,14 +34,36 @@ def why_not(obj: bpy.types.Object | None, role: str, scene: bpy.types.Scene, *, 
     called = rpt_(role)
     if obj is None:
         return rpt_("Choose a {} first").format(called)
+    if obj.type != "MESH" and obj.instance_type == "COLLECTION":
+        return instance(obj)
     if obj.type != "MESH":
         text = rpt_("'{}' is no mesh: convert it (Object > Convert > Mesh) or choose another {}")
         return text.format(obj.name, called)
     if comparison.is_copy(obj):
         return rpt_("'{}' is a copy of Side by Side: choose the object that it shows").format(obj.name)
     if not is_in_scene(obj, scene):
+        if (shown := _instance_with(obj, scene)) is not None:
+            return instance(shown)
         return rpt_("'{}' is not in this scene: choose another {}").format(obj.name, called)
     return _why_not_read(obj) or (why_not_written(obj) if writes else None)
+
+
+def instance(empty: bpy.types.Object) -> str:
+    """Return the sentence for an empty that shows a collection, whose meshes nobody can work on."""
+    text = rpt_("'{}' is a collection instance: select it and make its meshes real (Object > Apply > {})")
+    return text.format(empty.name, iface_("Make Instances Real", "Operator"))
+
+
+def _instance_with(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the object of a scene that shows another as part of a collection, or None; one in one counts too."""
+
+    def shows(empty: bpy.types.Object, known: frozenset[Any]) -> bool:
+        collection = empty.instance_collection
+        if empty.instance_type != "COLLECTION" or collection is None or collection in known:
+            return False
+        return any(other == obj or shows(other, known | {collection}) for other in collection.all_objects)
+
+    return next((empty for empty in scene.objects if shows(empty, frozenset())), None)
 
 
 def _why_not_read(obj: bpy.types.Object) -> str | None:
@@ -58,14 +81,24 @@ def why_not_written(obj: bpy.types.Object) -> str | None:
     """Return why a mesh object of any scene cannot be changed, or None if it can."""
     if reason := _why_not_read(obj):
         return reason
-    # of an overridden mesh Blender keeps no layer when the file is saved, though all can be written
-    if not (obj.is_editable and obj.data.is_editable) or obj.data.override_library is not None:
+    if is_read_only(obj):
         text = rpt_(
             "'{}' is linked from another file: make it local first "
             "(Object > Relations > Make Local > Selected Objects and Data)"
         )
         return text.format(obj.name)
     return None
+
+
+def is_read_only(obj: bpy.types.Object) -> bool:
+    """Return whether the mesh of an object is another file's: linked, or an override of one that is."""
+    # of an overridden mesh Blender keeps no layer when the file is saved, though all can be written
+    return not (obj.is_editable and obj.data.is_editable) or obj.data.override_library is not None
+
+
+def written(source: bpy.types.Object, target: bpy.types.Object) -> list[bpy.types.Object]:
+    """Return which meshes of a pair an alignment is written on: a source of another file is only read."""
+    return [target] if is_read_only(source) else [source, target]
 
 
 def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:

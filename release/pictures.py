@@ -1,7 +1,7 @@
 """The pictures of the guide and the README that show Blender's window, from what the window's tests have left.
 
-MOBIUS_WINDOW=1 MOBIUS_SHOTS=shots uv run pytest tests/window -k trixie
-uv run --group bench python -m release.pictures shots/trixie
+MOBIUS_WINDOW=1 MOBIUS_SHOTS=shots uv run pytest tests/window -k sid
+uv run --group bench python -m release.pictures shots/sid
 """
 
 import sys
@@ -12,9 +12,9 @@ from PIL import Image
 from .guide import DOCS
 
 PICTURES = {
-    "panel.png": ("shown.png", (0, 28, 1322, 1182)),
-    "guide-pairs.png": ("point-pairs.png", (0, 28, 1322, 1182)),
-    "overlay.png": ("discs.png", (0, 28, 1322, 1182)),
+    "panel.png": ("shown.png", (0, 28, 1312, 1182)),
+    "guide-pairs.png": ("point-pairs.png", (0, 28, 1312, 1182)),
+    "overlay.png": ("discs.png", (0, 28, 1312, 1182)),
 }
 """By name in docs: which picture of the tests, and which part of it: the viewport, left, top, right and bottom."""
 

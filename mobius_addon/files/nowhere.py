@@ -11,8 +11,10 @@ from ...solver.surface.mesh import Booleans
 _LARGEST = float(np.finfo(np.float32).max)
 
 _NO_NUMBER = re.compile(rb"nan|inf", re.IGNORECASE)
-_LARGE = re.compile(rb"e\+?0*(?:3[89]|[4-9]\d|\d{3})")
-"""An exponent of 38 or more."""
+_LARGE = re.compile(rb"e\+?0*(?:[2-9]\d|\d{3})")
+"""An exponent of 20 or more: with fewer than 20 digits before it, a smaller one does not reach 1e38."""
+
+_DIGITS = bytes.maketrans(b"123456789", b"000000000")
 
 
 def are_places(values: np.ndarray) -> Booleans:
@@ -23,7 +25,8 @@ def are_places(values: np.ndarray) -> Booleans:
 def may_be_nowhere(text: bytes) -> bool:
     """Return whether any number of a text may be no place: mostly none is, and that is found in no time."""
     small = text.lower()
-    return b"nan" in small or b"inf" in small or _LARGE.search(small) is not None
+    large = 20 * b"0" in small.translate(_DIGITS) or _LARGE.search(small) is not None
+    return large or b"nan" in small or b"inf" in small
 
 
 def is_nowhere(word: bytes) -> bool:

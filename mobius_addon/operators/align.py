@@ -1,7 +1,7 @@
 """Find the certified correspondence between two meshes and show it on both."""
 
 # no postponed annotations here: Blender reads the properties from them
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..translation import told
-from ..usable import by_uid, is_deleted, why_not_pair
+from ..usable import by_uid, is_deleted, is_read_only, why_not_pair, written
 from ..verdict import verdict_sentence
 from . import side_by_side
 
@@ -103,13 +103,16 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         found = []
         for uid, name, surface in zip(self.objects_read, self._names, self.surfaces, strict=True):
             obj = as_read(uid, name, surface)
-            results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
             found.append(obj)
+        for obj in written(*found):
+            results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
         return found[0], found[1]
 
     def keep(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
-        """Write an alignment on both meshes; if that fails, both are as they were."""
-        with restored_on_failure(source), restored_on_failure(target):
+        """Write an alignment on both meshes, or on the target alone; if that fails, both are as they were."""
+        with ExitStack() as stack:
+            for obj in written(source, target):
+                stack.enter_context(restored_on_failure(obj))
             write_alignment(source, target, done.alignment, done.correspondence, self.surfaces)
             stored_alignment.store(target, source, done.alignment, done.correspondence, self.surfaces)
 
@@ -118,6 +121,8 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
         for warning in [unseen_warning(source), unseen_warning(target), *done.alignment.warnings]:
             if warning:
                 self.report({"WARNING"}, told(warning))
+        if sentence := only_read(source):
+            self.report({"INFO"}, sentence)
         found = stored_alignment.figures(target)
         if found is not None:
             self.report({"INFO"}, verdict_sentence(bpy.context.scene, source, target, found))
@@ -144,8 +149,8 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Allow for two meshes in Object Mode that can be written."""
-        reason = why_not_pair(context, writes_source=True) or why_busy()
+        """Allow for two meshes in Object Mode of which the target can be written."""
+        reason = why_not_pair(context, writes_source=False) or why_busy()
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -153,7 +158,7 @@ class MOBIUS_OT_align(AlignOperator, bpy.types.Operator):
     def prepare(self, context: bpy.types.Context) -> Work:
         """Read both meshes."""
         settings = context.scene.mobius
-        for obj in (settings.source, settings.target):
+        for obj in written(settings.source, settings.target):
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
         return self.begin(context, settings.source, settings.target)
 
@@ -184,6 +189,14 @@ def as_read(uid: int, name: str, surface: Surface) -> bpy.types.Object:
     return obj
 
 
+def only_read(source: bpy.types.Object) -> str | None:
+    """Return the sentence about a source that nothing is written on, None if it can be written."""
+    if not is_read_only(source):
+        return None
+    text = rpt_("'{}' is linked from another file and only read: the shared layout and colors are on the target alone")
+    return text.format(source.name)
+
+
 def write_alignment(
     source: bpy.types.Object,
     target: bpy.types.Object,
@@ -194,7 +207,8 @@ def write_alignment(
 ) -> None:
     """Write the shared UV layout, the colors and the groups of matched points on both meshes.
 
-    `frame` carries the source's disc to where the layout shows it; by default to the target's.
+    A source of another file, which cannot be written, stays as it is. `frame` carries the
+    source's disc to where the layout shows it; by default to the target's.
     """
     shown: Any = frame or alignment.mobius
     carried: Any = shown(alignment.source.places)
@@ -208,15 +222,18 @@ def write_alignment(
         used = np.isfinite(places).all(axis=1)
         color = np.column_stack([0.5 + 0.5 * np.nan_to_num(places), np.ones(len(places))])
     else:
-        results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
+        if not is_read_only(source):
+            results.write_layout(source, SHARED_LAYOUT, here.at_corners(carried, np.nan), surfaces[0])
         results.write_layout(target, SHARED_LAYOUT, there.at_corners(still, np.nan), surfaces[1])
         carried = here.at_vertices(carried, np.nan)
         used = np.isfinite(carried)
         color = results.disc_color(np.where(used, carried, 0))
-    results.write_color(source, SHARED_COLOR, color, used)
     results.write_color(target, SHARED_COLOR, solver.interpolate(correspondence, color), correspondence.face >= 0)
     matched = np.where(correspondence.matched, correspondence.confidence, 0.0)
     results.write_group(target, MATCHED_GROUP, matched)
+    if is_read_only(source):
+        return
+    results.write_color(source, SHARED_COLOR, color, used)
     used = here.vertex_of >= 0
     if (whole := alignment.whole) is not None:
         used |= np.isin(whole.source.of_vertex, [x.source for x in whole.pairs if x.source and x.target is not None])

@@ -1,6 +1,7 @@
 """Align the source with every other selected mesh, as one job and one undo step."""
 
 # no postponed annotations here: Blender reads the properties from them
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,9 +20,9 @@ from ..mesh_data import Refusal, Surface, read_surface, unseen_warning
 from ..options import AlignOptions, ScanOptions, align_settings, outer_vertex
 from ..preferences import preferences
 from ..translation import told
-from ..usable import why_not, why_not_mode, why_not_two
+from ..usable import why_not, why_not_mode, why_not_two, written
 from ..verdict import counted, judgement_of, verdict_sentence
-from .align import Aligned, as_read, write_alignment
+from .align import Aligned, as_read, only_read, write_alignment
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +54,9 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Allow for a source and selected meshes in Object Mode that can be written."""
+        """Allow for a source and selected meshes in Object Mode, of which those can be written."""
         source, targets = context.scene.mobius.source, selected_targets(context)
-        reason = why_not(source, "source mesh", context.scene)
+        reason = why_not(source, "source mesh", context.scene, writes=False)
         if reason is None and not targets:
             reason = rpt_("Select the meshes that '{}' is to be aligned with").format(source.name)
         for target in targets:
@@ -74,7 +75,7 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
         kept = preferences(context)
         limit = kept.time_limit if kept else solver.AlignSettings().time_limit or 0.0
         targets: list[_Target] = []
-        for obj in (source, *objects):
+        for obj in {obj for own in objects for obj in written(source, own)}:
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
         for obj in objects:
             own = read_surface(obj)
@@ -119,7 +120,9 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
                 self.report({"WARNING"}, told(str(refusal)))
                 continue
             surfaces = self._surface, target.surface
-            with restored_on_failure(source), restored_on_failure(obj):
+            with ExitStack() as stack:
+                for one in written(source, obj):
+                    stack.enter_context(restored_on_failure(one))
                 # in the source's own disc, which is the same for all of them
                 write_alignment(
                     source, obj, done.alignment, done.correspondence, surfaces, frame=type(done.alignment.mobius)()
@@ -130,6 +133,8 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
             if (found := stored_alignment.figures(obj)) is not None:
                 levels.append(judgement_of(found).level)
                 self.report({"INFO"}, verdict_sentence(context.scene, source, obj, found))
+        if sentence := only_read(source):
+            self.report({"INFO"}, sentence)
         if not levels:
             raise Refusal(rpt_("None of the selected meshes could be aligned with '{}'").format(source.name))
         if len(self._targets) > 1:  # the last report is what the status bar shows

@@ -14,7 +14,7 @@ from ...solver import MeshError, Topology, TriangleMesh, topology, verdict
 from ...solver.align.cut.held import held
 from ...solver.surface.mesh import Booleans
 from .. import topology_cache, viewport
-from ..mesh_data import foreach, read_surface
+from ..mesh_data import foreach, read_surface, settle
 from ..options import repair
 from ..translation import told
 from ..usable import why_not, why_not_object_mode
@@ -49,6 +49,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Report one sentence."""
+        settle(context)
         obj: Any = bpy.data.objects.get(self.object_name) if self.object_name else context.object
         if self.object_name and obj is None:
             self.report({"ERROR"}, told(f"there is no object '{self.object_name}'"))

@@ -1,7 +1,7 @@
 """Align and transfer in one go, for two selected meshes."""
 
 # no postponed annotations here: Blender reads the properties from them
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -21,7 +21,7 @@ from ..options import (
     draw_transfer,
     transfer_settings,
 )
-from ..usable import by_uid, why_not, why_not_mode, why_not_two
+from ..usable import by_uid, why_not, why_not_mode, why_not_two, written
 from .align import Aligned, AlignOperator
 from .transfer import read_through
 
@@ -60,7 +60,7 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
         if not self.kinds:
             raise Refusal(rpt_("Choose at least one kind of data to transfer"))
         source, target = _pair(context)
-        for obj in (source, target):
+        for obj in written(source, target):
             results.require_room(obj, [SHARED_LAYOUT], [SHARED_COLOR])
         work = self.begin(context, source, target)
         self._known = None
@@ -83,7 +83,9 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
         found = result.correspondence if isinstance(result, Aligned) else result
         settings = transfer_settings(self)
         plan = read_through(source, target, self.surfaces, found, settings).carry()
-        with restored_on_failure(source), restored_on_failure(target):
+        with ExitStack() as stack:
+            for obj in written(source, target):
+                stack.enter_context(restored_on_failure(obj))
             if isinstance(result, Aligned):
                 self.keep(source, target, result)
             plan.write(target)
@@ -107,5 +109,5 @@ def _why_not(context: bpy.types.Context) -> str | None:
         return rpt_("Select two meshes, the source last: it is the active one")
     source, target = _pair(context)
     scene = context.scene
-    reason = why_not(source, "source mesh", scene) or why_not(target, "target mesh", scene)
+    reason = why_not(source, "source mesh", scene, writes=False) or why_not(target, "target mesh", scene)
     return reason or why_not_two(source, target) or why_not_mode(context)

@@ -8,7 +8,7 @@ from ...solver import MeshError
 from ..attributes import DISC_LAYOUT
 from ..computation import flattened
 from ..heat_maps import DISC_MEASURES, measure
-from ..mesh_data import Refusal, read_surface
+from ..mesh_data import Refusal, read_surface, settle
 from ..options import ScanOptions, outer_vertex, repair
 from ..results import require_room, write_color, write_layout
 from ..translation import told
@@ -51,6 +51,7 @@ class MOBIUS_OT_flatten(ScanOptions, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write the UV map and the colors."""
+        settle(context)
         obj = context.object
         shown = None if self.distortion == "none" else measure(self.distortion, DISC_MEASURES)
         try:

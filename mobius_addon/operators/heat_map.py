@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...solver import MeshError
 from .. import stored_alignment
 from ..heat_maps import MAP_MEASURES, measure
-from ..mesh_data import Refusal, read_surface
+from ..mesh_data import Refusal, read_surface, settle
 from ..results import require_room, write_color
 from ..translation import told
 from ..usable import why_not_aligned
@@ -38,6 +38,7 @@ class MOBIUS_OT_heat_map(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write the colors, and show them where Blender has a window."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         shown = measure(self.measure, MAP_MEASURES)
         try:

@@ -6,6 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..comparison import is_copy
 from ..joined import joined_copy
+from ..mesh_data import settle
 from ..usable import why_not, why_not_object_mode
 
 
@@ -35,6 +36,7 @@ class MOBIUS_OT_join_copy(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Join it, choose it, and select it alone."""
+        settle(context)
         settings = context.scene.mobius
         first = getattr(settings, self.role) or context.object
         others = selected_with(context, self.role)

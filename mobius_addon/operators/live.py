@@ -8,7 +8,7 @@ from ...solver import MeshError
 from .. import live, stored_alignment
 from ..attributes import restored_on_failure
 from ..jobs import why_busy
-from ..mesh_data import Refusal, read_surface
+from ..mesh_data import Refusal, read_surface, settle
 from ..translation import told
 from ..usable import why_not_aligned
 
@@ -35,6 +35,7 @@ class MOBIUS_OT_live(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write the correspondence on the target and add the modifier."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         try:
             if not self.attribute:

@@ -17,7 +17,7 @@ from ...solver import MeshError, TriangleMesh, topology
 from ...solver.surface.joining import TOUCHING
 from ...solver.surface.mesh import Booleans
 from .. import viewport
-from ..mesh_data import Refusal, foreach, read_surface
+from ..mesh_data import Refusal, foreach, read_surface, settle
 from ..translation import told
 from ..usable import why_not, why_not_object_mode
 from .check import outside_largest_part, select_vertices
@@ -80,6 +80,7 @@ class MOBIUS_OT_mend(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Mend the mesh in Edit Mode and come back; what was selected is so again."""
+        settle(context)
         obj: Any = bpy.data.objects.get(self.object_name) if self.object_name else context.object
         if reason := why_not(obj, "mesh", context.scene):
             self.report({"ERROR"}, reason)

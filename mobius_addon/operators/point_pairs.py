@@ -12,9 +12,9 @@ from mathutils import Vector
 from ...solver import MeshError
 from .. import point_pairs
 from ..jobs import redraw, why_busy
-from ..mesh_data import Refusal
+from ..mesh_data import Refusal, settle
 from ..translation import told
-from ..usable import why_not_aligned
+from ..usable import is_read_only, why_not_aligned
 
 
 class _OfPairs:
@@ -39,12 +39,16 @@ class _OfPairs:
 
     def bend(self, context: bpy.types.Context) -> set[str]:
         """Bend the map through the pairs that there are, and say what came of it."""
+        settle(context)
         settings = context.scene.mobius
         try:
             done = point_pairs.bend(settings.source, settings.target, follow_all=self.follow_all)
         except (Refusal, MeshError) as error:
             self.report({"ERROR"}, told(str(error)))
             return {"CANCELLED"}
+        if is_read_only(settings.source):
+            text = rpt_("'{}' is linked from another file: the shared layout and colors stay as Align left them")
+            self.report({"WARNING"}, text.format(settings.source.name))
         kind, said = point_pairs.describe(*done)
         self.report({kind}, said)
         redraw(context)
@@ -67,6 +71,7 @@ class MOBIUS_OT_add_pair(_OfPairs, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the pair and bend the map; if that fails there is no new pair."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         name = point_pairs.add_pair(context, source, target, (tuple(self.source_point), tuple(self.target_point)))
         done = self.bend(context)

@@ -8,7 +8,7 @@ from ...solver import MeshError
 from ...solver.surface.mesh import plural
 from .. import stored_alignment, viewport
 from ..attributes import mask_weights, unmatched_vertices
-from ..mesh_data import Refusal, foreach, read_surface
+from ..mesh_data import Refusal, foreach, read_surface, settle
 from ..options import SourceMaskOptions, source_mask
 from ..translation import told
 from ..usable import why_not_aligned
@@ -42,6 +42,7 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Select, and report how much of the target it is."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         try:
             surfaces = read_surface(source), read_surface(target)

@@ -14,14 +14,14 @@ from ...solver.surface.mesh import Complexes, Floats
 from .. import comparison, stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..comparison import add, copies, end, is_shown
-from ..mesh_data import Refusal, Surface, read_surface, seen_positions
+from ..mesh_data import Refusal, Surface, read_surface, seen_positions, settle
 from ..options import transfer_settings
 from ..preferences import preferences
 from ..results import pattern_color, read_layout, require_room, write_color
 from ..textures.preview import preview_settings, show_preview
 from ..textures.writing import has_pictures
 from ..translation import told
-from ..usable import why_not_aligned, why_not_object_mode
+from ..usable import is_read_only, why_not_aligned, why_not_object_mode
 from .transfer import read_through
 
 GAP = 0.15
@@ -45,6 +45,7 @@ class MOBIUS_OT_side_by_side(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Paint both meshes and put copies beside each other."""
+        settle(context)
         source, target = context.scene.mobius.source, context.scene.mobius.target
         try:
             surfaces, found = show(context, source, target)
@@ -139,7 +140,9 @@ def show_after(context: bpy.types.Context, source: bpy.types.Object, target: bpy
     how = kept.after_align if kept is not None else "side_by_side"
     if how == "nothing" or viewport.space_of(context) is None:
         return
-    if how == "pattern":
+    if is_read_only(source):  # it cannot be painted, and is seen where it is
+        context.window_manager.mobius_view.matches = True
+    elif how == "pattern":
         paint(source, target)
         viewport.show_colors(context)
     else:

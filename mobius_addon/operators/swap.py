@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...solver import MeshError
 from ...solver.carry.inverse import inverted
 from .. import stored_alignment
-from ..mesh_data import Refusal, read_surface
+from ..mesh_data import Refusal, read_surface, settle
 from ..translation import told
 from ..usable import why_not_pair
 
@@ -29,6 +29,7 @@ class MOBIUS_OT_swap(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Exchange them. Where there is a map and none the other way yet, that is computed."""
+        settle(context)
         settings = context.scene.mobius
         chosen = stored_alignment.pair(context)
         if chosen is not None and not stored_alignment.exists(*chosen):

@@ -4,6 +4,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..comparison import is_copy
+from ..usable import instance
 
 
 class MOBIUS_OT_use_selected(bpy.types.Operator):
@@ -18,7 +19,9 @@ class MOBIUS_OT_use_selected(bpy.types.Operator):
         """Allow for selected meshes, one of them active."""
         chosen = _chosen(context)
         if len(chosen) < 2 or context.object not in chosen:
-            cls.poll_message_set(rpt_("Select the target, or several, and the source last: it is the active one"))
+            shown = next((obj for obj in context.selected_objects if obj.instance_type == "COLLECTION"), None)
+            text = rpt_("Select the target, or several, and the source last: it is the active one")
+            cls.poll_message_set(text if shown is None else instance(shown))
             return False
         return True
 

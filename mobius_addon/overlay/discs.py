@@ -11,6 +11,7 @@ from gpu_extras.batch import batch_for_shader
 
 from .. import stored_alignment
 from ..results import read_layout
+from ..usable import written
 from .drawing import POINT_SIZE, draw_points, floats, free_room, on_plane, write
 from .matches import chosen_matches
 from .remembered import remember
@@ -29,6 +30,8 @@ def draw_discs() -> None:
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     report = hash(chosen[1].data.mobius_alignment.report)
     for kind, obj, color in zip(("source", "target"), chosen, (SOURCE_COLOR, TARGET_COLOR), strict=True):
+        if obj not in written(*chosen):  # a layout in the source's own file is that of another alignment
+            continue
         batch = _layout_batch(kind, obj, report)
         if batch is not None:
             shader.bind()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import stored_alignment, topology_cache
+from .. import topology_cache
 from ..job import Job, describe_left, describe_proof
 from ..jobs import MOBIUS_OT_stop
 from ..operators.align import MOBIUS_OT_align
@@ -18,7 +18,7 @@ from ..operators.use_selected import MOBIUS_OT_use_selected
 from ..options import ALIGN_OPTIONS, SCAN_OPTIONS, repair
 from ..preferences import preferences
 from ..translation import told
-from ..usable import why_not, why_not_written
+from ..usable import is_read_only, why_not, why_not_written
 from .help import draw_help
 from .mending import draw_menu, draw_remedies
 from .place import MobiusPanel, beside_or_below, draw_refused, draw_sentence, draw_wrapped, hand_on
@@ -88,9 +88,10 @@ def _draw_picker(layout: bpy.types.UILayout, context: bpy.types.Context, role: s
     if others := selected_with(context, role):
         text = iface_("Join a Copy of {:,} Selected").format(len(others) + 1)
         column.operator(MOBIUS_OT_join_copy.bl_idname, text=text, icon="AUTOMERGE_ON", translate=False).role = role
-    # what is aligned may be read from another file, but not aligned there
-    gives = role == "source" and settings.target is not None and stored_alignment.exists(settings.target, obj)
-    if not gives and (reason := why_not_written(obj)):
+    if role == "source" and is_read_only(obj):
+        text = iface_("'{}' is linked from another file: Align only reads it, and writes on the target alone")
+        draw_sentence(column, context, text.format(obj.name), "LOCKED")
+    elif reason := why_not_written(obj):
         draw_sentence(column, context, reason, "LOCKED")
 
 

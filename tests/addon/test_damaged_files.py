@@ -281,6 +281,14 @@ def nan_at(place: Callable[[bytes], int]) -> Callable[[bytes], bytes]:
             "a point.*first is on line",
         ),
         ("text.ply", replaced(b"end_header\n", b"end_header\n1e39 "), "a point.*vertex 0"),
+        ("text.ply", replaced(b"end_header\n", b"end_header\n" + b"7" * 39 + b" "), "a point.*vertex 0"),
+        (
+            "sheet.obj",
+            lambda content: re.sub(rb"(?m)^v \S+", b"v -4" + 38 * b"0" + b".5", content, count=2),
+            "2 points.*first is on line",
+        ),
+        ("text.stl", lambda content: re.sub(rb"vertex \S+", b"vertex 12345e35", content, count=1), "first is on line"),
+        ("sheet.off", replaced(b"49 36 0\n", b"49 36 0\n" + b"4" * 39 + b" "), "a point.*vertex 0"),
         ("text.stl", lambda content: re.sub(rb"vertex \S+", b"vertex -4.1E+038", content, count=1), "first is on line"),
         ("sheet.off", replaced(b"49 36 0\n", b"49 36 0\n1e39 "), "a point.*vertex 0"),
         ("binary.vtk", lambda content: patched(content.index(b"double") + 7, ">d", float("inf"))(content), "vertex 0"),
@@ -299,6 +307,13 @@ def test_other_values_may_be_no_numbers(tmp_path: Path) -> None:
     header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     header += "property float quality\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
     path.write_text(header + "0 0 0 nan\n1 0 0 0\n0 1 0 inf\n3 0 1 2\n")
+    assert outcome(path) == ""
+
+
+@pytest.mark.parametrize("number", [38 * "3", "0." + 45 * "9", "12345e33", "0000" + 36 * "1"])
+def test_long_numbers_that_are_places_are_read(number: str, tmp_path: Path) -> None:
+    path = tmp_path / "long.obj"
+    path.write_text(f"v 0 0 0\nv 1 0 {number}\nv 0 1 0\nf 1 2 3\n")
     assert outcome(path) == ""
 
 

@@ -35,7 +35,7 @@ class Window:
         self.timers = 0
         self.window, self.windows = None, []
         self.window_manager = self
-        self.scene, self.workspace = bpy.context.scene, WORKSPACES[0]
+        self.scene, self.workspace, self.view_layer = bpy.context.scene, WORKSPACES[0], bpy.context.view_layer
 
     def event_timer_add(self, _seconds: float, *, window: Any) -> str:
         self.timers += 1

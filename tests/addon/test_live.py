@@ -139,3 +139,18 @@ def test_two_meshes_do_not_follow_each_other(aligned: Any) -> None:
     assert not [name for name in LIVE_NAMES if name in source.data.attributes]
     target.modifiers.clear()
     assert bpy.ops.mobius.live(attribute="Own") == {"FINISHED"}
+
+
+def test_another_source_without_the_attribute_is_not_asked_for_it(aligned: Any) -> None:
+    source, target, _ = aligned
+    settings = bpy.context.scene.mobius
+    layer(source, "Both", "FLOAT", "value", 1)
+    layer(target, "Both", "FLOAT", "value", 1)
+    settings.live_attribute = "Right"
+    assert bpy.ops.mobius.swap() == {"FINISHED"}
+    assert (settings.source, settings.live_attribute) == (target, "")
+    settings.live_attribute = "Both"
+    bpy.ops.mobius.swap()
+    assert (settings.source, settings.live_attribute) == (source, "Both")
+    settings.source = None  # while another is being chosen
+    assert settings.live_attribute == "Both"

@@ -258,6 +258,18 @@ def test_align_names_everything_that_is_wrong_with_the_choice(pair: tuple[Any, A
     bpy.data.scenes.new("Other").collection.objects.link(source)
     bpy.context.scene.collection.objects.unlink(source)
     refused("'Source' is not in this scene")
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type = "COLLECTION"
+    instance.instance_collection = collection = bpy.data.collections.new("Character")
+    inner = bpy.data.objects.new("Inner", None)
+    inner.instance_type, inner.instance_collection = "COLLECTION", bpy.data.collections.new("Part")
+    collection.objects.link(inner)
+    inner.instance_collection.objects.link(source)
+    bpy.context.scene.collection.objects.link(instance)
+    refused(r"'Instance' is a collection instance: select it and .* \(Object > Apply > Make Instances Real\)")
+    settings.source = instance
+    refused("'Instance' is a collection instance")
+    settings.source = source
     bpy.context.scene.collection.objects.link(source)
     activate(target)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -278,8 +290,8 @@ def test_linked_meshes_are_only_read(tmp_path: Any) -> None:
     linked = wanted.objects[0]
     bpy.context.scene.collection.objects.link(linked)
     assert why_not(linked, "mesh", bpy.context.scene, writes=False) is None
-    bpy.context.scene.mobius.source = linked
-    bpy.context.scene.mobius.target = make_sheet("Target", 8)
+    bpy.context.scene.mobius.source = make_sheet("Source", 8)
+    bpy.context.scene.mobius.target = linked
     with pytest.raises(RuntimeError, match="'Library Sheet' is linked from another file: make it local first"):
         bpy.ops.mobius.align(**QUICK)
     activate(linked)

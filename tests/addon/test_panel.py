@@ -396,7 +396,7 @@ def fields(text: str) -> list[tuple[str | None, str | None]]:
 
 def test_german_covers_the_interface() -> None:
     # the Python module is built without languages: the window's test shows the panel in German
-    blenders_own = {"Add Alignment Preset", "Add Transfer Preset"}
+    blenders_own = {"Add Alignment Preset", "Add Transfer Preset", "Make Instances Real"}
     missing = (texts.of_classes() | texts.of_code()) - set(GERMAN) - blenders_own
     assert sorted(text for text in missing if not text.startswith("Keep the")) == []
     for english, german in GERMAN.items():

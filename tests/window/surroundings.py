@@ -6,6 +6,7 @@ the search for commands. `bpy`, `PACKAGE`, `region`, `click`, `drag` and `shot` 
 
 import importlib
 from pathlib import Path
+from typing import Any
 
 import hand
 from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointer, screen_height, undo, until
@@ -13,6 +14,7 @@ from hand import SHOTS, Wait, click_on, find, over_the_viewport, picture, pointe
 vars(hand).update(region=region, click=click, shot=shot)
 demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
 Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
+stored_alignment = importlib.import_module(PACKAGE + ".mobius_addon.stored_alignment")
 comparison = importlib.import_module(PACKAGE + ".mobius_addon.comparison")
 
 QUICK = {"samples": 60, "targets": 300, "reflect": "never", "refine": "mobius"}
@@ -179,10 +181,30 @@ def linked(names: tuple[str, str]) -> Wait:
     bpy.context.scene.mobius.target = there
     yield from picture("linked")
     assert not bpy.ops.mobius.align.poll() or refused()
-    bpy.context.scene.mobius.target = target
-    bpy.data.libraries.remove(there.library)
+    yield from only_read(there, bpy.data.objects[names[0]])
+    bpy.context.scene.mobius.source, bpy.context.scene.mobius.target = (bpy.data.objects[name] for name in names)
+    bpy.data.libraries.remove(bpy.data.libraries[0])
     path.unlink()
     yield 0.5
+
+
+def only_read(source: Any, target: Any) -> Wait:
+    """A linked source is aligned by the button: the panel says before that it is only read, and it is."""
+    settings, kept = bpy.context.scene.mobius, bpy.context.preferences.addons[PACKAGE].preferences
+    settings.source, settings.target, kept.after_align = source, target, "side_by_side"
+    bpy.ops.ed.undo_push(message="chosen")
+    before = source.data.attributes.keys(), bpy.data.meshes.keys()
+    yield from click_on((yield from find("bpy.ops.mobius.align")))
+    yield from until(lambda: Job.current is not None)
+    yield from until(lambda: Job.current is None)
+    yield from picture("linked-source")
+    assert (source.data.attributes.keys(), bpy.data.meshes.keys()) == before
+    assert stored_alignment.exists(target, source)
+    assert bpy.context.window_manager.mobius_view.matches, "what was found is not shown"
+    assert not comparison.is_shown(bpy.context)
+    bpy.context.window_manager.mobius_view.matches, kept.after_align = False, "nothing"
+    undo()
+    yield 1.0
 
 
 def refused() -> bool:

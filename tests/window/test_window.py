@@ -27,10 +27,11 @@ PICTURES = {
     ),
     "textures_clicks": ("textures-preview", "textures-at-15", "textures-at-50", "textures-transferred"),
     "pairing": ("point-pairs",),
+    "fitting": ("fitted", "redo-fitted"),
     "following": ("empties-missing", "empties", "live", "swapped", "discs-opened", "discs-closed"),
     "surroundings": (
         *("example", "search", "light", "large-scale", "large-scale-german", "narrow-german", "narrow"),
-        *("weight-paint", "sculpt", "two-windows", "in-the-way", "mended", "linked"),
+        *("weight-paint", "sculpt", "two-windows", "in-the-way", "mended", "linked", "linked-source"),
     ),
     "large": ("large", "large-searching", "large-side-by-side", "large-transferred"),
     "expressions": ("expressions-aligned", "expressions-0", "expressions-1", "expressions-ended"),
