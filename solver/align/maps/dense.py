@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from ...bend.bend import finished
 from ...bend.draft import NODES, ROUNDS, Draft, drafted
-from ...bend.plate import CUT_REACH, RIM_REACH
 from ...flatten.distortion import signed_areas
 from ...flatten.sphere import Flat
 from ...stages import Part
@@ -102,25 +100,12 @@ def bent_densely(
         return _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.4, 1.0)), remarks)
     begin, end = (0.5, 1.0) if alone is None else (0.4, 0.7)
     clock.begin("bend", "Bending", begin)
-    found = replace(found, counterpart=there, remarks=remarks)
-    as_wholes = _of_wholes(found, draft, RIM_REACH, clock.within(begin, end))
-    if not shows_what_is_missing(as_wholes):
+    bending = finished(draft, source, target, progress=clock.within(begin, end))
+    as_wholes = replace(found, bending=bending, counterpart=there, remarks=remarks)
+    if alone is None or not shows_what_is_missing(as_wholes):
         return as_wholes
-    if alone is not None:
-        shared_alone = _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.7, 1.0)), remarks)
-        if agrees_better(shared_alone, as_wholes):
-            return shared_alone
-    if max(missing) > SETTLED:
-        # boundaries that do not lie on each other everywhere may not be the same
-        freer = _of_wholes(found, draft, CUT_REACH, clock.within(end, end))
-        if agrees_better(freer, as_wholes):
-            return freer
-    return as_wholes
-
-
-def _of_wholes(found: Alignment, draft: Draft, reach: float, tell: Callable[[float], None]) -> Alignment:
-    """Return the alignment by the wholes of two surfaces, their boundaries drawn to each other within `reach`."""
-    return replace(found, bending=finished(draft, found.source, found.target, progress=tell, reach=reach))
+    shared_alone = _of_overlap(found, overlap_of(found, draft, alone, searching, clock.part(0.7, 1.0)), remarks)
+    return shared_alone if agrees_better(shared_alone, as_wholes) else as_wholes
 
 
 def _of_overlap(found: Alignment, overlap: Overlap, remarks: tuple[Remark, ...]) -> Alignment:
