@@ -22,7 +22,7 @@ move is sought, and at last."""
 CELLS = 40
 """Cells along the longest side of a box about the surface, in each of which the vertex next to its middle is known."""
 
-BESIDE = 4
+BESIDE = 6
 """Cells from one with a vertex in it within which the vertex next to a cell's middle is sought; farther away, where no
 point lies on the surface, one of the next cell with any is taken, in a tenth of the time."""
 
