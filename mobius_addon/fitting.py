@@ -43,6 +43,7 @@ def wrapped_object(
     if is_mirrored(source) ^ is_mirrored(target) ^ fitted.reflected:
         mesh.flip_normals()
     mesh.update()
+    _shear(obj, target)
     return obj
 
 
@@ -64,6 +65,7 @@ def reshaped_object(
     key.value = 1.0
     obj.active_shape_key_index = len(keys.key_blocks) - 1
     obj.data.update()
+    _shear(obj, target)
     return obj
 
 
@@ -82,6 +84,14 @@ def sphere_object(obj: bpy.types.Object, places: Floats) -> bpy.types.Object:
 def surface_rest(source: bpy.types.Object, surface: Surface) -> Floats:
     """Return the vertices at rest, (n, 3), in the object's own space."""
     return mirrored(source, surface.rest.vertices)
+
+
+def _shear(obj: bpy.types.Object, like: bpy.types.Object) -> None:
+    """Give a new object's mesh the shear that another has by its parents' scales, which no object has by itself."""
+    shear = obj.matrix_basis.inverted_safe() @ like.matrix_world
+    if not np.allclose(shear, np.eye(4), atol=1e-5):  # some roundings of float32
+        obj.data.transform(shear, shape_keys=True)
+        obj.data.update()
 
 
 def _copy(of: bpy.types.Object, beside: bpy.types.Object, name: str) -> bpy.types.Object:

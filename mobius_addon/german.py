@@ -84,6 +84,7 @@ GERMAN = {
     "Turn every face to its other side": "Jede Fläche auf ihre andere Seite drehen",
     "What is done to the mesh": "Was mit dem Mesh geschieht",
     "'{}' has nothing that this would change": "„{}“ hat nichts, was dies ändern würde",
+    "'{}' is hidden in part, which would not be mended: reveal it in Edit Mode (Alt H) first": "„{}“ ist zum Teil verborgen, was nicht ausgebessert würde: erst im Bearbeitungsmodus zeigen (Alt H)",
     "'{}' has no seams: mark the edges to cut along in Edit Mode (Edge > Mark Seam)": "„{}“ hat keine Nähte: die Kanten, an denen geschnitten werden soll, im Bearbeitungsmodus markieren (Kante > Naht markieren)",
     "'{}': {}; {:,} vertices and {:,} faces, before {:,} and {:,}": "„{}“: {}; {:,} Punkte und {:,} Flächen, vorher {:,} und {:,}",
     "Choose a source or target mesh first": "Zuerst ein Quell- oder Ziel-Mesh wählen",

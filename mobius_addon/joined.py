@@ -91,6 +91,9 @@ def _whole(
     for copy in copies:
         first.objects.link(copy)
     bpy.context.view_layer.update()
+    for copy in copies:
+        if is_mirrored(copy) != is_mirrored(whole):  # Blender joins it inside out
+            copy.data.flip_normals()
     spare = [copy.data for copy in copies[1:]]
     with (
         quiet(),

@@ -124,17 +124,26 @@ def _mend(context: bpy.types.Context, obj: bpy.types.Object, how: str) -> None:
     Raises
     ------
     Refusal
-        It cannot be edited here, or there is no seam to cut along.
+        It cannot be edited here, something of it is hidden, or there is no seam to cut along.
     MeshError
         It cannot be read.
     """
     if how == "cut" and not foreach(obj.data.edges, "use_seam", 1, np.bool_).any():
         text = rpt_("'{}' has no seams: mark the edges to cut along in Edit Mode (Edge > Mark Seam)")
         raise Refusal(text.format(obj.name))
+    own = obj.data
+    if any(foreach(elements, "hide", 1, np.bool_).any() for elements in (own.vertices, own.edges, own.polygons)):
+        # Edit Mode's tools leave it out: half of the faces would be turned, say
+        text = rpt_("'{}' is hidden in part, which would not be mended: reveal it in Edit Mode (Alt H) first")
+        raise Refusal(text.format(obj.name))
     mesh = read_surface(obj).mesh
+    key = obj.active_shape_key_index
     selected, active = list(context.selected_objects), context.view_layer.objects.active
-    _choose(obj.data, mesh, how)
+    _choose(own, mesh, how)
+    # Edit Mode shows the active shape: where that closes lids or lips, they would be merged
+    obj.active_shape_key_index = 0
     if reason := viewport.edit(context, obj, look=False):
+        obj.active_shape_key_index = key
         raise Refusal(reason)
     tools = context.tool_settings
     kept = tuple(tools.mesh_select_mode)
@@ -144,6 +153,7 @@ def _mend(context: bpy.types.Context, obj: bpy.types.Object, how: str) -> None:
     finally:
         tools.mesh_select_mode = kept
         bpy.ops.object.mode_set(mode="OBJECT")
+        obj.active_shape_key_index = key
         for other in context.view_layer.objects:
             other.select_set(other in selected)
         context.view_layer.objects.active = active

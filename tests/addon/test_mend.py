@@ -147,3 +147,34 @@ def test_what_is_in_the_way_is_told_from_what_is_mended_anyway() -> None:
     assert (line.is_disc, line.remedy, line.edits[0]) == (False, "largest_part", "largest")
     assert mend(obj, "largest") == {"FINISHED"}
     assert line_of(obj, repair(settings)).is_disc
+
+
+@pytest.mark.parametrize("pinned", [False, True])
+def test_what_meets_in_the_active_shape_alone_is_not_joined(pinned: bool) -> None:
+    """As closed lids do."""
+    obj = sheet()
+    closed = obj.data.shape_keys.key_blocks["Smile"]
+    closed.points[15].co = closed.points[14].co
+    obj.active_shape_key_index, obj.show_only_shape_key = 1, pinned
+    shape = [point.co[:] for point in closed.points]
+    assert mend(obj, "join") == {"CANCELLED"}
+    assert len(obj.data.vertices) == 12 * 12
+    assert (obj.active_shape_key_index, obj.show_only_shape_key) == (1, pinned)
+    assert [point.co[:] for point in obj.data.shape_keys.key_blocks["Smile"].points] == shape
+
+
+def test_faces_that_are_hidden_are_not_left_behind() -> None:
+    obj = sheet()
+    for polygon in obj.data.polygons[:10]:
+        polygon.hide = True
+    upwards = [polygon.normal.z > 0 for polygon in obj.data.polygons]
+    for remedy in REMEDIES:
+        if remedy.identifier != "cut":  # there is no seam
+            with pytest.raises(RuntimeError, match="hidden in part"):
+                mend(obj, remedy.identifier)
+    assert [polygon.normal.z > 0 for polygon in obj.data.polygons] == upwards
+    assert [polygon.hide for polygon in obj.data.polygons[:11]] == [True] * 10 + [False]
+    for polygon in obj.data.polygons:
+        polygon.hide = False
+    assert mend(obj, "flip") == {"FINISHED"}
+    assert [polygon.normal.z < 0 for polygon in obj.data.polygons] == upwards

@@ -134,3 +134,33 @@ def test_a_new_object_is_seen_where_both_were_shown_side_by_side(bent: tuple[Any
     assert "Mobius Side by Side" not in bpy.context.scene.collection.children
     assert bpy.context.selected_objects == [made()]
     assert made().name == "Source on Target"
+
+
+@pytest.mark.parametrize("scale", [(1, 3, 1), (-1, 3, 1)])
+def test_it_lies_on_a_target_that_its_parent_shears(bent: tuple[Any, Any], scale: tuple[float, ...]) -> None:
+    """No object without a parent has such a place: its mesh and all its keys are sheared."""
+    source, target = bent
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.scale, target.parent = scale, parent
+    bpy.context.view_layer.update()
+
+    def in_world(obj: Any, key: str | None = None) -> np.ndarray:
+        places = positions(obj) if key is None else [x.co[:] for x in obj.data.shape_keys.key_blocks[key].points]
+        matrix = np.array(obj.matrix_world)
+        return np.asarray(places) @ matrix[:3, :3].T + matrix[:3, 3]
+
+    bpy.ops.mobius.align(**ACCURATE | {"reflect": "always" if scale[0] < 0 else "never"})
+    before = everything(source), everything(target)
+    bpy.ops.mobius.wrap()
+    bpy.context.view_layer.update()
+    right = rolled(positions(source))
+    matrix = np.array(target.matrix_world)
+    right = right @ matrix[:3, :3].T + matrix[:3, 3]
+    off = np.linalg.norm(in_world(made(), "Basis") - right, axis=1)
+    assert np.median(off) < 0.005 * np.linalg.norm(np.ptp(right, axis=0))
+    assert (in_world(made()) == in_world(made(), "Basis")).all()
+    bpy.ops.mobius.wrap(fitted="target")
+    bpy.context.view_layer.update()
+    assert np.allclose(in_world(made(), "Basis"), in_world(target), atol=1e-4)
+    assert (everything(source), everything(target)) == before
