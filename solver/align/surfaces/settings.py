@@ -39,6 +39,9 @@ class AlignSettings:
         Seconds for each search.
     most_nodes : int, optional
         Cells for each search: a limit that gives the same on every machine, however busy it is.
+    gap : float
+        Share of its value within which a search in discs ends that is not proved after 100,000 cells, which is said. 0:
+        not before it is proved, or time is up.
     thorough : bool
         Search the orientation that loses, and for a rival, beyond what decides whether they come within
         `reflect_margin`: then their values are the best there are. Dense refinement, which may go on with one of them,
@@ -72,6 +75,7 @@ class AlignSettings:
     take_rival: bool = False
     time_limit: float | None = 60.0
     most_nodes: int | None = None
+    gap: float = 0.005
     thorough: bool = True
     threads: int | None = None
     refine: str = "dense"
@@ -101,6 +105,8 @@ class AlignSettings:
             raise ValueError(f"time_limit must be a number of seconds, not {self.time_limit}")
         if self.most_nodes is not None and self.most_nodes < 1:
             raise ValueError(f"most_nodes must be at least 1, not {self.most_nodes}")
+        if not self.gap >= 0:
+            raise ValueError(f"gap must be a share of the value, 0 or more, not {self.gap}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, not {self.threads}")
         if not 0 < self.compatible <= 1:

@@ -6,6 +6,7 @@ import pytest
 from scans import bumps, mirrored, mutual_pairs, percent, places, posed, remeshed, shuffled
 
 from solver import Alignment, AlignSettings, Cancelled, MeshError, TriangleMesh, align, correspond, report
+from solver.align.maps import mobius_map
 from solver.align.surfaces.objective import compatibility, covering_radius
 from solver.mobius import hyperbolic_distance
 
@@ -217,6 +218,16 @@ def test_no_time_still_gives_a_map_and_says_so(sheet, found):
     assert not alignment.search.certified
     assert alignment.search.upper_bound >= found[0].search.value
     assert any("not proved optimal" in warning for warning in alignment.warnings)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3])
+def test_a_search_that_takes_long_ends_within_its_gap_and_says_so(sheet, found, monkeypatch, gap: float):
+    monkeypatch.setattr(mobius_map, "PROVING", 1)
+    alignment = align(sheet, found[0].target.mesh, replace(SMALL, gap=gap))
+    best = found[0].search.value
+    assert alignment.search.value <= best <= alignment.search.upper_bound <= (1 + gap) * alignment.search.value
+    assert alignment.search.certified == (gap == 0)
+    assert any("not proved optimal" in warning for warning in alignment.warnings) == (gap > 0)
 
 
 def test_report_is_plain_data(found):
