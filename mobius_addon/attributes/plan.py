@@ -82,9 +82,7 @@ class Transfer:
 
 def write_transfers(pairs: Sequence[tuple[bpy.types.Object, Transfer]]) -> None:
     """Write what was carried to each target; if one of them fails, all are as they were."""
-    with made_or_removed() as made, ExitStack() as stack:
-        for obj, _ in pairs:
-            stack.enter_context(restored_on_failure(obj))
+    with made_or_removed() as made, restored_on_failure(*(obj for obj, _ in pairs)):
         for obj, transfer in pairs:
             _write(obj, transfer, made)
 
@@ -138,8 +136,16 @@ def _active_layers_kept(obj: bpy.types.Object) -> Iterator[None]:
 
 
 @contextmanager
-def restored_on_failure(obj: bpy.types.Object) -> Iterator[None]:
-    """Put the object's mesh back as it was if the body fails: Blender takes no undo step of a failed operator."""
+def restored_on_failure(*objects: bpy.types.Object) -> Iterator[None]:
+    """Put the objects' meshes back as they were if the body fails: Blender takes no undo step of a failed operator."""
+    with ExitStack() as stack:
+        for obj in objects:
+            stack.enter_context(_restored(obj))
+        yield
+
+
+@contextmanager
+def _restored(obj: bpy.types.Object) -> Iterator[None]:
     mesh = obj.data
     keys = mesh.shape_keys
     names = mesh.name, keys.name if keys else ""

@@ -1,7 +1,7 @@
 """Find the certified correspondence between two meshes and show it on both."""
 
 # no postponed annotations here: Blender reads the properties from them
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -110,9 +110,7 @@ class AlignOperator(JobOperator, AlignOptions, ScanOptions):
 
     def keep(self, source: bpy.types.Object, target: bpy.types.Object, done: Aligned) -> None:
         """Write an alignment on both meshes, or on the target alone; if that fails, both are as they were."""
-        with ExitStack() as stack:
-            for obj in written(source, target):
-                stack.enter_context(restored_on_failure(obj))
+        with restored_on_failure(*written(source, target)):
             write_alignment(source, target, done.alignment, done.correspondence, self.surfaces)
             stored_alignment.store(target, source, done.alignment, done.correspondence, self.surfaces)
 

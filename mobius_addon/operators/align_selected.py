@@ -1,7 +1,6 @@
 """Align the source with every other selected mesh, as one job and one undo step."""
 
 # no postponed annotations here: Blender reads the properties from them
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,9 +119,7 @@ class MOBIUS_OT_align_selected(JobOperator, AlignOptions, ScanOptions, bpy.types
                 self.report({"WARNING"}, told(str(refusal)))
                 continue
             surfaces = self._surface, target.surface
-            with ExitStack() as stack:
-                for one in written(source, obj):
-                    stack.enter_context(restored_on_failure(one))
+            with restored_on_failure(*written(source, obj)):
                 # in the source's own disc, which is the same for all of them
                 write_alignment(
                     source, obj, done.alignment, done.correspondence, surfaces, frame=type(done.alignment.mobius)()

@@ -1,7 +1,7 @@
 """Align and transfer in one go, for two selected meshes."""
 
 # no postponed annotations here: Blender reads the properties from them
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -83,9 +83,7 @@ class MOBIUS_OT_conformal_transfer(AlignOperator, TransferOptions, bpy.types.Ope
         found = result.correspondence if isinstance(result, Aligned) else result
         settings = transfer_settings(self)
         plan = read_through(source, target, self.surfaces, found, settings).carry()
-        with ExitStack() as stack:
-            for obj in written(source, target):
-                stack.enter_context(restored_on_failure(obj))
+        with restored_on_failure(*written(source, target)):
             if isinstance(result, Aligned):
                 self.keep(source, target, result)
             plan.write(target)

@@ -8,38 +8,28 @@ from typing import Any
 
 import hand
 from hand import Wait, click_on, find, over_the_viewport, picture, pointer, redo, screen_height, undo, until
-from mathutils import Euler, Vector
 from redoing import show_panel
+from two_heads import aligned_heads
 
 vars(hand).update(region=region, click=click, shot=shot)
-demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
-panels = importlib.import_module(PACKAGE + ".mobius_addon.panel")
 Job = importlib.import_module(PACKAGE + ".mobius_addon.job").Job
 
 
 def steps() -> Wait:
     """Make the fitted shape by its button, exchange in the redo panel which is bent, and take it back."""
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    for mesh in list(bpy.data.meshes):
-        bpy.data.meshes.remove(mesh)
-    source, target, _ = demo.build_objects(bpy.context.scene)
-    target.scale = (0.55,) * 3
-    target.location = Vector((2.6, 0.4, 0)) - 0.55 * Vector(sum(map(Vector, target.bound_box), Vector()) / 8)
-    settings = bpy.context.scene.mobius
-    settings.source, settings.target = source, target
-    bpy.context.view_layer.update()
-    bpy.context.space_data.region_3d.view_rotation = Euler((1.3, 0, 0.15)).to_quaternion()
-    bpy.ops.view3d.view_all()
-    assert bpy.ops.mobius.align("EXEC_DEFAULT", True) == {"FINISHED"}
-    for folded in (panels.MOBIUS_PT_pictures, panels.MOBIUS_PT_transfer):
-        bpy.utils.unregister_class(folded)  # so that the sidebar need not be scrolled
+    source, target = aligned_heads(PACKAGE)
     yield 1.0
     before, own = scene(), set(bpy.data.objects.keys())
     onto, as_source = f"{source.name} on {target.name}", f"{target.name} as {source.name}"
 
     def made(name: str) -> Any:
         return lambda: Job.current is None and set(bpy.data.objects.keys()) == own | {name}
+
+    def undone() -> Wait:
+        undo()
+        yield from until(lambda: set(bpy.data.objects.keys()) == own)
+        yield 1.0
+        same(scene(), before)
 
     yield from click_on((yield from find("bpy.ops.mobius.wrap")))
     yield from until(made(onto))
@@ -60,18 +50,12 @@ def steps() -> Wait:
     yield from until(made(onto))
     yield 1.0
     same(scene(), first)
-    undo()
-    yield from until(lambda: set(bpy.data.objects.keys()) == own)
-    yield 1.0
-    same(scene(), before)
+    yield from undone()
     redo()
     yield from until(made(onto))
     yield 1.0
     same(scene(), first)
-    undo()
-    yield from until(lambda: set(bpy.data.objects.keys()) == own)
-    yield 1.0
-    same(scene(), before)
+    yield from undone()
     print("[clicks] done", flush=True)
 
 

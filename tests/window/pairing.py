@@ -9,10 +9,10 @@ from typing import Any
 import hand
 from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origin_3d, region_2d_to_vector_3d
 from hand import Wait, click_on, escape, picture, screen_height, undo, until
-from mathutils import Euler, Vector
+from mathutils import Vector
+from two_heads import aligned_heads
 
 vars(hand).update(region=region, click=click, shot=shot)
-demo = importlib.import_module(PACKAGE + ".mobius_addon.demo")
 point_pairs = importlib.import_module(PACKAGE + ".mobius_addon.point_pairs")
 mesh_data = importlib.import_module(PACKAGE + ".mobius_addon.mesh_data")
 stored_alignment = importlib.import_module(PACKAGE + ".mobius_addon.stored_alignment")
@@ -21,20 +21,8 @@ panels = importlib.import_module(PACKAGE + ".mobius_addon.panel")
 
 def steps() -> Wait:
     """Everything, with the seconds to wait in between."""
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    source, target, _ = demo.build_objects(bpy.context.scene)
-    target.scale = (0.55,) * 3
-    target.location = Vector((2.6, 0.4, 0)) - 0.55 * Vector(sum(map(Vector, target.bound_box), Vector()) / 8)
-    settings = bpy.context.scene.mobius
-    settings.source, settings.target = source, target
-    bpy.context.view_layer.update()
-    bpy.context.space_data.region_3d.view_rotation = Euler((1.3, 0, 0.15)).to_quaternion()
-    bpy.ops.view3d.view_all()
-    assert bpy.ops.mobius.align("EXEC_DEFAULT", True) == {"FINISHED"}
+    source, target = aligned_heads(PACKAGE)
     names = source.name, target.name
-    for folded in (panels.MOBIUS_PT_pictures, panels.MOBIUS_PT_transfer):
-        bpy.utils.unregister_class(folded)  # so that the sidebar need not be scrolled
     bpy.utils.unregister_class(panels.MOBIUS_PT_pairs)
     panels.MOBIUS_PT_pairs.bl_options = set()  # unfolded: the guide shows it
     bpy.utils.register_class(panels.MOBIUS_PT_pairs)
