@@ -10,10 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..solver import Correspondence
-from ..solver.carry.fitted import is_reflected, similarity
+from ..solver.carry.fitted import is_reflected
 from ..solver.carry.frames import nearest_orthogonal
 from ..solver.carry.interpolate import places
 from ..solver.surface.mesh import Floats
+from ..solver.surface.superimposing import superimposing
 from .attributes.expression_names import understood
 from .mesh_data import Refusal, Surface, foreach, mirrored, rest_positions
 from .studio.materials import CLAY, cover, fresh_tree
@@ -125,7 +126,7 @@ def poses(
     if not known.any():
         return Rotation.from_matrix(own), Rotation.from_matrix(own)
     here = places(correspondence, rests[0].vertices)[1][known]
-    turn = nearest_orthogonal(own[None] @ similarity(rests[1].vertices[known], here, None, reflected)[:3, :3])[0]
+    turn = nearest_orthogonal(own[None] @ superimposing(rests[1].vertices[known], here, mirrored=reflected).turn.T)[0]
     if reflected:  # as in a mirror beside it
         turn = np.diag([-1.0, 1.0, 1.0]) @ turn
     return Rotation.from_matrix(own), Rotation.from_matrix(turn)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...solver import Correspondence
 from ...solver.surface.mesh import Floats
+from ...solver.surface.superimposing import superimposing
 from ..mesh_data import Surface
 from .scans import POSE, GroundTruth, deform
 
@@ -58,7 +58,5 @@ def transfer_error(correspondence: Correspondence, source: Surface, target: Surf
 def best_rigid_error(truth: GroundTruth, source: Surface, target: Surface) -> Spread:
     """Measure what the best rotation, scale and translation leaves, fitted to the true correspondence."""
     from_points, to_points = truth.positions(source.mesh.vertices), target.mesh.vertices
-    flat, goal = from_points - from_points.mean(axis=0), to_points - to_points.mean(axis=0)
-    turned = Rotation.align_vectors(goal, flat)[0].apply(flat)
-    scale = (turned * goal).sum() / (turned * turned).sum()
-    return Spread.of(np.linalg.norm(scale * turned - goal, axis=1), target)
+    pose = superimposing(from_points, to_points, scaled=True)
+    return Spread.of(np.linalg.norm(pose(from_points) - to_points, axis=1), target)

@@ -9,8 +9,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ...solver import Correspondence, MeshError
-from ...solver.carry.fitted import similarity
 from ...solver.surface.mesh import Complexes, Floats
+from ...solver.surface.superimposing import superimposing
 from .. import comparison, stored_alignment, viewport
 from ..attributes import PATTERN_COLOR
 from ..comparison import add, copies, end, is_shown
@@ -110,7 +110,8 @@ def show(
     mirrored = target.data.mobius_alignment.reflected
     places = [_world(obj) for obj in (source, target)]
     some = found.matched if found.matched.any() else found.face >= 0
-    pose = similarity(places[1][some], (found.matrix() @ places[0])[some], reflected=mirrored)
+    fixed = (found.matrix() @ places[0])[some]
+    pose = superimposing(places[1][some], fixed, mirrored=mirrored, scaled=True).matrix
     right = viewport.axes_of(viewport.space_of(context))[0]
     posed = places[1] @ pose[:3, :3].T + pose[:3, 3]
     step = _beside(places[0] @ right, posed @ right)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from itertools import permutations, product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
+from ..surface.superimposing import superimposing
 from .pose import ASKED, FEW, MOST, in_pose, in_poses, misfit, misfits
 
 FEW_ROUNDS = 5
@@ -33,18 +33,17 @@ def posed(mesh: TriangleMesh, onto: SurfacePoints, roughly: SurfacePoints) -> tu
     other, other_axes = _moments(onto.mesh)
     starts = np.stack([(mesh.vertices - middle) @ (other_axes @ turn @ axes.T).T + other for turn in _turns()])
     tried = in_poses(mesh, starts, roughly, FEW_ROUNDS, FEW)
-    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in tried], roughly, ASKED)
+    apart = misfits(mesh, [_pose(mesh.vertices, x) for x in tried], roughly, ASKED)
     kept = in_poses(mesh, tried[np.argsort(apart, kind="stable")[:KEPT]], roughly)
-    apart = misfits(mesh, [_rigid(mesh.vertices, x) for x in kept], roughly, MOST)
+    apart = misfits(mesh, [_pose(mesh.vertices, x) for x in kept], roughly, MOST)
     best = in_pose(mesh.moved(kept[int(np.argmin(apart))]), onto)
     return best, misfit(mesh.moved(best), onto)
 
 
-def _rigid(one: Floats, two: Floats) -> tuple[Floats, Floats]:
+def _pose(one: Floats, two: Floats) -> tuple[Floats, Floats]:
     """Return the rotation, (3, 3), and the shift, (3,), after it that carry points to others in another pose."""
-    here, there = one.mean(axis=0), two.mean(axis=0)
-    turn = Rotation.align_vectors(two - there, one - here)[0].as_matrix()
-    return turn, there - turn @ here
+    pose = superimposing(one, two)
+    return pose.turn.T, pose.shift
 
 
 def _moments(mesh: TriangleMesh) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
+from ..surface.superimposing import superimposing
 from .plate import planes
 
 POSE_ROUNDS = 30
@@ -100,11 +101,7 @@ def rigidly(flat: TriangleMesh, places: Floats, trust: Floats) -> Floats:
     base = flat.vertex_areas * trust
     weight, x = base, flat.vertices
     for _ in range(PROCRUSTES_ROUNDS):
-        share = weight / weight.sum()
-        middle, other = share @ flat.vertices, share @ places
-        left, _, right = np.linalg.svd((share[:, None] * (places - other)).T @ (flat.vertices - middle))
-        left[:, 2] *= np.sign(np.linalg.det(left @ right))
-        x = (flat.vertices - middle) @ (left @ right).T + other
+        x = superimposing(flat.vertices, places, weight)(flat.vertices)
         distance = np.linalg.norm(x - places, axis=1)
         weight = base / (1 + (distance / max(weighted_median(distance, base), 1e-6)) ** 2)
     return x

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
+from ..surface.superimposing import superimposing
 from .correspond import Correspondence
 from .fill import nearest_known
 from .interpolate import places
@@ -75,8 +76,8 @@ def wrapped(correspondence: Correspondence, source: TriangleMesh, target: Triang
     place = places(correspondence, source.vertices)[1]
     reflected = is_reflected(correspondence, source, target)
     weight = np.where(known, target.vertex_areas * correspondence.confidence, 0)
-    move = similarity(place[known], target.vertices[known], weight[known], reflected)
-    rest = TriangleMesh(source.vertices @ move[:3, :3].T + move[:3, 3], source.faces)
+    pose = superimposing(place[known], target.vertices[known], weight[known], mirrored=reflected, scaled=True)
+    rest = TriangleMesh(pose(source.vertices), source.faces)
     spacing = np.sqrt(target.vertex_areas[known].mean())
     matched = _near_places(source, target, place, known)
     rows = csr_array(correspondence.matrix()[known])
@@ -109,8 +110,8 @@ def in_shape_of(correspondence: Correspondence, source: TriangleMesh, target: Tr
     known = _known(correspondence)
     place = places(correspondence, source.vertices)[1]
     reflected = is_reflected(correspondence, source, target)
-    move = similarity(place[known], target.vertices[known], target.vertex_areas[known], reflected)
-    posed = place @ move[:3, :3].T + move[:3, 3]
+    areas = target.vertex_areas[known]
+    posed = superimposing(place[known], target.vertices[known], areas, mirrored=reflected, scaled=True)(place)
     rows = csr_array(diags_array(np.ones(len(known))))[known]
     # exact where known, but for a hundredth of the distance between vertices
     plate = _Plate(target, 0.01 * np.sqrt(target.vertex_areas[known].mean()))
@@ -128,24 +129,6 @@ def in_shape_of(correspondence: Correspondence, source: TriangleMesh, target: Tr
         vertices = np.where(held[:, None], posed, plate.drawn(rows, posed[held], target.vertex_areas[held]))
         over = folds(target, vertices)
     return Fitted(vertices, known & ~free, False, int(over.sum()))
-
-
-def similarity(moving: Floats, fixed: Floats, weight: Floats | None = None, reflected: bool = False) -> Floats:
-    """Return the matrix, (4, 4), of rotation, uniform scale and shift that best carries points, (k, 3), onto others.
-
-    Least squares by weight, (k,), without a reflection, or with one: Umeyama, "Least-squares estimation of
-    transformation parameters between two point patterns" (1991).
-    """
-    share = np.full(len(moving), 1 / len(moving)) if weight is None else weight / weight.sum()
-    middle, aim = share @ moving, share @ fixed
-    u, stretch, v = np.linalg.svd((share[:, None] * (fixed - aim)).T @ (moving - middle))
-    sign = np.array([1, 1, np.sign(np.linalg.det(u @ v)) * (-1 if reflected else 1)])
-    turn = (u * sign) @ v
-    size = (stretch @ sign) / max(share @ ((moving - middle) ** 2).sum(axis=1), 1e-300)
-    matrix = np.eye(4)
-    matrix[:3, :3] = size * turn
-    matrix[:3, 3] = aim - size * turn @ middle
-    return matrix
 
 
 def is_reflected(correspondence: Correspondence, source: TriangleMesh, target: TriangleMesh) -> bool:

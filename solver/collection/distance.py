@@ -19,7 +19,7 @@ from ..flatten.sphere import Flat
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
 from ..surface.mesh import Floats, Integers, Places
-from .procrustes import superimposing
+from ..surface.superimposing import superimposing
 
 STEPS = 4
 """Steps of the flow: 8 and 16 change the distance of a cap of the sphere from a flat disc, known exactly, by less than

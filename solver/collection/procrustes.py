@@ -1,68 +1,17 @@
-"""Corresponding points superimposed: one pair of shapes, and many onto their mean."""
+"""Many shapes of corresponding points, superimposed onto their mean."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..surface.mesh import Floats
+from ..surface.superimposing import Pose, superimposing
 
 SETTLED = 1e-10
 """Change of the mean, squared, in squared centroid sizes, at which it has settled: beyond what any scanner resolves."""
 
 ROUNDS = 100
 """Rounds at most, so that it ends where two means alternate."""
-
-
-@dataclass(frozen=True, eq=False)
-class Pose:
-    """A similarity: x -> scale * x @ turn + shift.
-
-    Attributes
-    ----------
-    turn : (3, 3) float64
-        Orthogonal; of determinant -1 where it mirrors.
-    shift : (3,) float64
-    scale : float
-    """
-
-    turn: Floats
-    shift: Floats
-    scale: float = 1.0
-
-    def __call__(self, points: Floats) -> Floats:
-        """Return the images of points, (q, 3)."""
-        return self.scale * points @ self.turn + self.shift
-
-
-def superimposing(
-    points: Floats, onto: Floats, weights: Floats, *, mirrored: bool = False, scaled: bool = False
-) -> Pose:
-    """Return the pose that brings points nearest to others, in the sum of weighted squares.
-
-    Kabsch, "A solution for the best rotation to relate two sets of vectors" (1976); the scale by Umeyama (1991).
-
-    Parameters
-    ----------
-    points, onto : (q, 3) float64
-    weights : (q,) float64
-        Non-negative, with a positive sum.
-    mirrored : bool
-        Whether the pose is to turn orientation round.
-    scaled : bool
-        Whether it may change size.
-    """
-    share = weights / weights.sum()
-    middle, other = share @ points, share @ onto
-    left, stretch, right = np.linalg.svd((share[:, None] * (points - middle)).T @ (onto - other))
-    sign = np.ones(3)
-    if (np.linalg.det(left @ right) < 0) != mirrored:
-        sign[2] = -1
-    turn = (left * sign) @ right
-    square = float(share @ ((points - middle) ** 2).sum(axis=1))
-    scale = float(stretch @ sign) / square if scaled and square > 0 else 1.0
-    return Pose(turn, other - scale * middle @ turn, scale)
 
 
 def centroid_size(points: Floats, weights: Floats) -> float:

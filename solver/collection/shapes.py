@@ -14,10 +14,11 @@ import numpy as np
 from ..carry.fill import HarmonicFill
 from ..surface.mesh import Booleans, Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import SurfacePoints
+from ..surface.superimposing import Pose, superimposing
 from .chart import Chart, Step, carried_along, mirrored
 from .collect import Collection
 from .cycles import step
-from .procrustes import Pose, generalised, superimposing
+from .procrustes import generalised
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,6 @@ from mobius_extension.mobius_addon.heat_maps import (  # noqa: E402
 from mobius_extension.mobius_addon.overlay import legend  # noqa: E402
 from mobius_extension.mobius_addon.overlay.matches import chosen_matches, hues  # noqa: E402
 from mobius_extension.solver import Correspondence, TriangleMesh  # noqa: E402
-from mobius_extension.solver.carry.fitted import similarity  # noqa: E402
 
 ACCURATE = QUICK | {"samples": 40, "targets": 300, "refine": "mobius"}
 
@@ -234,16 +233,6 @@ def test_legends_stay_on_screen_and_apart(count: int, width: float, height: floa
 
 
 # side by side
-
-
-def test_the_best_similarity_is_found() -> None:
-    rng = np.random.default_rng(3)
-    points, turn = rng.normal(size=(40, 3)), Rotation.from_rotvec((1.0, -2.0, 0.5)).as_matrix()
-    matrix = similarity(points, 0.3 * points @ turn.T + (1, 2, 3))
-    assert matrix[:3, :3] == pytest.approx(0.3 * turn)
-    assert matrix[:3, 3] == pytest.approx((1, 2, 3))
-    mirrored = similarity(points, points * (-1, 1, 1))
-    assert np.linalg.det(mirrored[:3, :3]) > 0
 
 
 def test_side_by_side_shows_copies_in_one_pose(aligned: tuple[Any, Any]) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...bend.coarse import coarse
 from ...bend.draft import Draft, facing
@@ -18,6 +17,7 @@ from ...search.outcome import SearchResult
 from ...stages import Part
 from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
+from ...surface.superimposing import superimposing
 from ...surface.topology import topology
 from ..maps.mobius_map import implied, improved, rival_of, taking, unproved, valued
 from ..result.agreement import descriptor_distance
@@ -98,9 +98,8 @@ def by_pose(matched: Alignment, onto: SurfacePoints, known: Callable[[Floats], b
         all_vertices = whole.vertices / np.sqrt(whole.area)
         few = coarse(target, POSE_NODES, order)
         x, apart = posed(TriangleMesh(all_vertices[few.nodes], few.faces), onto, roughly)
-        here, there = all_vertices[few.nodes].mean(axis=0), x.mean(axis=0)
-        turn = Rotation.align_vectors(x - there, all_vertices[few.nodes] - here)[0]
-        poses.append((apart, reflected, turn.apply(all_vertices - here) + there, whole.faces))
+        pose = superimposing(all_vertices[few.nodes], x)
+        poses.append((apart, reflected, pose(all_vertices), whole.faces))
     _, reflected, start, faces = min(poses, key=lambda pose: pose[:2])
     if known(start):
         return None
@@ -126,9 +125,8 @@ def by_own_mirror(matched: Alignment, draft: Draft) -> Hypothesis | None:
     whole, _ = facing(target, False)
     rest, there = whole.vertices / np.sqrt(whole.area), mirrored(draft.places(), *plane)
     used = target.used
-    here, middle = rest[used].mean(axis=0), there[used].mean(axis=0)
-    turn = Rotation.align_vectors(there[used] - middle, rest[used] - here, weights=target.vertex_areas[used])[0]
-    start = TriangleMesh(turn.apply(rest - here) + middle, whole.faces)
+    pose = superimposing(rest[used], there[used], target.vertex_areas[used])
+    start = TriangleMesh(pose(rest), whole.faces)
     return _in_pose(matched, draft.onto, start, False, SIDES)
 
 

@@ -18,6 +18,7 @@ from ...bend.draft import facing, ready
 from ...bend.pose import HELD, POSE_SETTLED
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.sampling import spread
+from ...surface.superimposing import superimposing
 from ..result.alignment import Alignment
 from ..result.confidence import MATCHED, SURE
 from ..surfaces.remark import Remark
@@ -145,11 +146,9 @@ def motions(found: Alignment) -> Iterator[Motion]:
 def _carried(found: Alignment, some: Integers, matched: Booleans, places: Floats) -> tuple[Floats, Floats]:
     """Return where the points that are not matched lie, (q, 3), and their normals, (q, 3), as the others are moved."""
     whole, _ = facing(found.target.mesh, found.mobius.reflected)
-    here, there = whole.vertices[some], places[matched]
-    first, second = here[matched].mean(axis=0), there.mean(axis=0)
-    turn = Rotation.align_vectors(there - second, here[matched] - first)[0]
-    growth = np.linalg.norm(there - second) / np.linalg.norm(here[matched] - first)
-    return turn.apply(here[~matched] - first) * growth + second, turn.apply(whole.vertex_normals()[some[~matched]])
+    here = whole.vertices[some]
+    pose = superimposing(here[matched], places[matched], scaled=True)
+    return pose(here[~matched]), whole.vertex_normals()[some[~matched]] @ pose.turn
 
 
 def _settled(own: OwnFit, points: Floats, normals: Floats, turn: Floats, shift: Floats) -> tuple[Floats, Floats]:

@@ -9,10 +9,10 @@ import numpy as np
 
 from solver import Correspondence, TriangleMesh
 from solver.carry.contacts import brought_together
-from solver.carry.fitted import similarity
 from solver.carry.frames import local_similarities
 from solver.carry.gradients import GradientTransfer
 from solver.surface.nearest import SurfacePoints
+from solver.surface.superimposing import superimposing
 from tests.bench.heads.people import Head
 from tests.bench.heads.targets import Target
 
@@ -76,13 +76,13 @@ def nearest_point(head: Head, target: Target, places: np.ndarray, known: np.ndar
     known : (n,) bool
         Which vertices these are.
     """
-    pose = similarity(target.mesh.vertices[known], places)
-    there = target.mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
+    pose = superimposing(target.mesh.vertices[known], places, scaled=True)
+    there = pose(target.mesh.vertices)
     normals = TriangleMesh(there, target.mesh.faces).vertex_normals()
     face, barycentric = SurfacePoints(head.mesh, (), 0.0).nearest_point(there, normals)
-    back = np.linalg.inv(pose[:3, :3])
+    back = pose.turn.T / pose.scale
 
     def carry(displacements: np.ndarray) -> np.ndarray:
-        return np.einsum("qk,qkd->qd", barycentric, displacements[head.mesh.faces[face]]) @ back.T
+        return np.einsum("qk,qkd->qd", barycentric, displacements[head.mesh.faces[face]]) @ back
 
     return carry

@@ -8,7 +8,8 @@ from surfaces import planar, rings, spherical_cap
 
 from solver import TriangleMesh, flatten
 from solver.collection.distance import EvenFlow, continuous_procrustes
-from solver.collection.procrustes import centroid_size, generalised, superimposing
+from solver.collection.procrustes import centroid_size, generalised
+from solver.surface.superimposing import superimposing
 
 
 def by_symmetry(alpha: float) -> float:
@@ -58,20 +59,6 @@ def test_the_same_surface_in_another_pose_is_at_no_distance() -> None:
     image = flatten(mirrored(mesh))
     assert continuous_procrustes(flow, image, located, mirrored=True) < 0.003
     assert continuous_procrustes(flow, image, located, mirrored=False) > 0.02
-
-
-def test_superimposing_undoes_a_pose() -> None:
-    rng = np.random.default_rng(1)
-    points, weights = rng.normal(size=(30, 3)), rng.uniform(0.1, 1, 30)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    for mirror in (False, True):
-        turn[:, 0] *= np.sign(np.linalg.det(turn)) * (-1 if mirror else 1)
-        onto = 2.5 * points @ turn + [1, 2, 3]
-        pose = superimposing(points, onto, weights, mirrored=mirror, scaled=True)
-        np.testing.assert_allclose(pose(points), onto, atol=1e-12)
-        assert pose.scale == pytest.approx(2.5)
-        wrong = superimposing(points, onto, weights, mirrored=not mirror, scaled=True)
-        assert np.linalg.norm(wrong(points) - onto) > 1
 
 
 def test_the_mean_of_one_shape_in_many_poses_is_that_shape() -> None:
