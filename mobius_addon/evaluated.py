@@ -13,6 +13,7 @@ import numpy as np
 from ..solver import Correspondence, TriangleMesh
 from ..solver.align.result.confidence import BOUND
 from ..solver.carry.parts import pieces
+from ..solver.surface.barycentric import interpolated
 from ..solver.surface.mesh import Floats, Integers
 from ..solver.surface.nearest import SurfacePoints
 from .mesh_data import Refusal, Surface, foreach, mirrored, read_surface, seen_positions
@@ -61,11 +62,11 @@ class Shown:
         traced, kept = self._traced
         located = np.flatnonzero(found.face >= 0)
         own = original.mesh
-        places = np.einsum("qk,qkd->qd", found.barycentric[located], own.vertices[own.faces[found.face[located]]])
+        places = interpolated(own.vertices, own.faces[found.face[located]], found.barycentric[located])
         normals = own.face_vectors[found.face[located]]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
         there, weights = traced.most_alike(places, normals)
-        reached = np.einsum("qk,qkd->qd", weights, traced.mesh.vertices[traced.mesh.faces[there]])
+        reached = interpolated(traced.mesh.vertices, traced.mesh.faces[there], weights)
         # coarser triangles lie farther off
         reach = np.maximum(BOUND * own.diagonal, traced.mesh.edge_lengths[there].max(axis=1))
         near = np.linalg.norm(reached - places, axis=1) < reach

@@ -18,6 +18,7 @@ from ...solver.carry.fill import HarmonicFill, nearest_known, with_nearest
 from ...solver.carry.frames import local_similarities
 from ...solver.carry.gradients import GradientTransfer
 from ...solver.carry.parts import drawn_apart, without_riders
+from ...solver.surface.barycentric import weighted
 from ...solver.surface.joining import first_of_place
 from ...solver.surface.mesh import Booleans, Floats, Integers
 from ..mesh_data import Surface
@@ -114,9 +115,9 @@ class Carrier:
         corners = values[found.source_triangles[found.face]].astype(np.float64)
         nearest = corners[np.arange(len(corners)), found.barycentric.argmax(axis=1)]
         same_half = np.where(np.einsum("qkd,qd->qk", corners, nearest) < 0, -1.0, 1.0)
-        mean = np.einsum("qk,qkd->qd", found.barycentric * same_half, corners)
+        mean = weighted(corners, found.barycentric * same_half)
         length = np.linalg.norm(mean, axis=1)
-        wanted = np.einsum("qk,qk->q", found.barycentric, np.linalg.norm(corners, axis=2))
+        wanted = weighted(np.linalg.norm(corners, axis=2), found.barycentric)
         mean *= np.divide(wanted, length, out=np.ones_like(length), where=length > 0)[:, None]
         return mean, found.face >= 0
 

@@ -8,6 +8,7 @@ import zlib
 
 import numpy as np
 
+from ...solver.surface.barycentric import interpolated
 from ...solver.surface.mesh import Floats, Integers
 
 SIDE = 132
@@ -62,9 +63,9 @@ def thumbnail(vertices: Floats, faces: Integers, colors: Floats, axes: Floats, *
     numbers = rng.poisson(DENSE * areas)
     face = np.repeat(np.arange(len(faces)), numbers)
     weights = rng.dirichlet(np.ones(3), len(face))
-    point = np.einsum("qk,qkd->qd", weights, seen[faces[face]])
-    shade = np.einsum("qk,qkd->qd", weights, smooth[faces[face]]) @ _LIGHT
-    tint = np.einsum("qk,qkd->qd", weights, colors[faces[face]]) * (0.35 + 0.65 * np.clip(shade, 0, 1))[:, None]
+    point = interpolated(seen, faces[face], weights)
+    shade = interpolated(smooth, faces[face], weights) @ _LIGHT
+    tint = interpolated(colors, faces[face], weights) * (0.35 + 0.65 * np.clip(shade, 0, 1))[:, None]
     column = np.clip((point[:, 0] + pixels / 2).astype(int), 0, pixels - 1)
     row = np.clip((pixels / 2 - point[:, 1]).astype(int), 0, pixels - 1)
     order = np.argsort(point[:, 2], kind="stable")  # the nearest is written last

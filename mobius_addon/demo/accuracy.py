@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...solver import Correspondence
+from ...solver.surface.barycentric import weighted
 from ...solver.surface.mesh import Floats
 from ...solver.surface.superimposing import superimposing
 from ..mesh_data import Surface
@@ -50,7 +51,7 @@ def transfer_error(correspondence: Correspondence, source: Surface, target: Surf
     """
     found = correspondence.face >= 0
     corners = source.mesh.vertices[correspondence.source_triangles[correspondence.face[found]]]
-    counterparts = np.einsum("nk,nkd->nd", correspondence.barycentric[found], corners)
+    counterparts = weighted(corners, correspondence.barycentric[found])
     landed = POSE(deform(counterparts))
     return Spread.of(np.linalg.norm(landed - target.mesh.vertices[found], axis=1), target)
 

@@ -17,6 +17,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from scipy.spatial.transform import Rotation
 
+from ...solver.surface.barycentric import weighted
 from ...solver.surface.mesh import Floats, Integers
 from ..mesh_data import foreach, read_vertices
 
@@ -69,7 +70,7 @@ class GroundTruth:
     def positions(self, source_vertices: Floats) -> Floats:
         """Return the true counterparts on the source, (n, 3), in the source's own coordinates."""
         corners = source_vertices[self.triangles[self.face]]
-        return np.einsum("nk,nkd->nd", self.barycentric, corners)
+        return weighted(corners, self.barycentric)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 
 from ...solver import TriangleMesh
 from ...solver.align.result.confidence import BOUND
+from ...solver.surface.barycentric import interpolated
 from ...solver.surface.mesh import Floats, Integers
 from ...solver.surface.nearest import SurfacePoints
 from .reading import Imported
@@ -157,7 +158,7 @@ def _on_surface(points: Floats, imported: Imported, mesh: TriangleMesh) -> tuple
     found = []
     for what, placed in imported.readings(points):
         face, weights = surface.nearest_point(placed, np.zeros_like(placed), _SAMPLES)
-        nearest = np.einsum("qk,qkd->qd", weights, mesh.vertices[mesh.faces[face]])
+        nearest = interpolated(mesh.vertices, mesh.faces[face], weights)
         off = np.linalg.norm(placed - nearest, axis=1) / mesh.diagonal
         found.append((what, placed, off, int((off <= FAR).sum())))
     best = 0

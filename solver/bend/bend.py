@@ -19,6 +19,7 @@ import numpy as np
 
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Booleans, Floats, Places, TriangleMesh
 from .coarse import coarse
 from .draft import DRAFT_ROUNDS, ROUNDS, SOFTEST, STIFFEST, Draft, drafted, lengths
@@ -112,7 +113,7 @@ def finished(
     face, barycentric = onto.nearest_point(
         all_places[used], normals[used], progress=lambda share: tell(0.8 + 0.15 * share)
     )
-    reached = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
+    reached = interpolated(onto.mesh.vertices, source.mesh.faces[face], barycentric)
     offset = np.zeros(len(target.places))
     offset[used] = np.linalg.norm(reached - all_places[used], axis=1)
     carried = conformal.copy()

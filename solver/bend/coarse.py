@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from ..flatten.domain import Domain
 from ..flatten.sphere import Flat
+from ..surface.barycentric import weighted
 from ..surface.mesh import Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
 from ..surface.sampling import edge_graph, thinned
@@ -58,7 +59,7 @@ class Coarse:
         from_node = unbent[self.vertices][:, None] - rest[self.leaders]
         moved = now[self.leaders] + np.einsum("kvij,kvj->kvi", turn, from_node)
         result = np.zeros_like(unbent)
-        result[self.vertices] = np.einsum("kv,kvd->kd", self.weights, moved)
+        result[self.vertices] = weighted(moved, self.weights)
         return result
 
 
@@ -140,7 +141,7 @@ def _leaders(
         face = corner[first[region[row]] + k] // 3
         corners = vertices[nodes[faces[face]]]
         barycentric = nearest_in_triangle(vertices[used[row]], corners)
-        apart = np.linalg.norm(np.einsum("kv,kvd->kd", barycentric, corners) - vertices[used[row]], axis=1)
+        apart = np.linalg.norm(weighted(corners, barycentric) - vertices[used[row]], axis=1)
         nearer = apart < least[row]
         row = row[nearer]
         leaders[row], weights[row], least[row] = faces[face[nearer]], barycentric[nearer], apart[nearer]

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..flatten.sphere import Flat
 from ..mobius import Mobius, SphereMobius
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
@@ -207,7 +208,7 @@ def _best_start(
 def _positions(places: Places, source: Flat, onto: SurfacePoints) -> Floats:
     """Return where points of the source's domain lie on the scaled source, (q, 3)."""
     face, barycentric = source.triangles.locate(places)
-    return np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[source.mesh.faces[face]])
+    return interpolated(onto.mesh.vertices, source.mesh.faces[face], barycentric)
 
 
 def _growth(mesh: TriangleMesh, places: Floats, trust: Floats) -> float:

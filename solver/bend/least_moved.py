@@ -9,6 +9,7 @@ import numpy as np
 from ..flatten.distortion import signed_areas
 from ..flatten.injective import relocated
 from ..flatten.sphere import Flat
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Complexes, Floats, Integers
 from .rim import Rim
 from .unfold import in_order, injective
@@ -88,4 +89,4 @@ def _distance(places: Complexes, points: Floats, source: Flat, vertices: Floats)
     if not len(places):
         return np.zeros(0)
     face, barycentric = source.triangles.locate(places)
-    return np.linalg.norm(np.einsum("qk,qkd->qd", barycentric, vertices[source.mesh.faces[face]]) - points, axis=1)
+    return np.linalg.norm(interpolated(vertices, source.mesh.faces[face], barycentric) - points, axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Floats, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.statistics import weighted_median
@@ -132,8 +133,8 @@ def _mean_distances(
     normals = np.concatenate([surface.normals[some] @ turn.T for turn, _ in poses])
     face, barycentric = onto.most_alike(points, normals)
     corners = onto.mesh.faces[face]
-    point = np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners])
-    normal = np.einsum("qk,qkd->qd", barycentric, onto.normals[corners])
+    point = interpolated(onto.mesh.vertices, corners, barycentric)
+    normal = interpolated(onto.normals, corners, barycentric)
     square = ((point - points) ** 2).sum(axis=1) + onto.normal_weight**2 * ((normal - normals) ** 2).sum(axis=1)
     areas = mesh.vertex_areas[some]
     return np.minimum(np.sqrt(square), FAR).reshape(len(poses), -1) @ areas / areas.sum()

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import nearest_in_triangle
 from .gradients import GradientTransfer
@@ -64,7 +65,7 @@ class Contacts:
 
     def across(self, values: Floats) -> Floats:
         """Return by how much values at vertices, (n, 3), take each vertex away from the plane, (c,)."""
-        there = np.einsum("ck,ckd->cd", self.barycentric, values[self.corners])
+        there = interpolated(values, self.corners, self.barycentric)
         return np.einsum("cd,cd->c", values[self.vertex] - there, self.normal)
 
     def spread(self, force: Floats, size: int) -> Floats:
@@ -109,8 +110,8 @@ def facing(
     for face in near.T:
         corners = faces[face]
         weights = nearest_in_triangle(now[vertex], now[corners])
-        distance = np.linalg.norm(np.einsum("qk,qkd->qd", weights, now[corners]) - now[vertex], axis=1)
-        before = np.linalg.norm(np.einsum("qk,qkd->qd", weights, places[corners]) - places[vertex], axis=1)
+        distance = np.linalg.norm(interpolated(now, corners, weights) - now[vertex], axis=1)
+        before = np.linalg.norm(interpolated(places, corners, weights) - places[vertex], axis=1)
         fits = (np.einsum("qd,qd->q", across[face], normals[vertex]) < 0) & (before > apart) & (distance < best)
         best[fits], found[fits], barycentric[fits], opening[fits] = (
             distance[fits],

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
+from ..surface.barycentric import weighted
 from ..surface.mesh import Booleans, Floats, Integers
 from .charts import Charts, Joints
 from .correspond import Correspondence
@@ -47,7 +48,7 @@ class _BesideSeams:
     def values(self, corner_values: Floats) -> Floats:
         """Return the values, (c, d), of the corners from source values, (3 m, d), that break at the same seams."""
         charts = replace(self.charts, values=corner_values.reshape(len(self.charts.triangles), 3, -1))
-        at_anchor = np.einsum("gk,gkd->gd", self.anchor_weights, charts.values[self.anchor])
+        at_anchor = weighted(charts.values[self.anchor], self.anchor_weights)
         its = self.group
         return on_side_of_anchor(
             charts, self.source_vertices, self.face, self.weights, self.place,
@@ -165,7 +166,7 @@ class CornerInterpolation:
         known = face >= 0
         # inside one island a vertex has one value, but for slits and for what lies on the seam itself
         off_seam = ~charts.seam[charts.triangles]
-        on_seam = np.einsum("qk,qk->q", weights, off_seam[face]) < 1e-9
+        on_seam = weighted(off_seam[face], weights) < 1e-9
         touching = known & (on_seam | charts.slit[charts.triangles].any(axis=1)[face])
         island = np.where(known, charts.island[face], -1)
         corners = self.target_triangles.T

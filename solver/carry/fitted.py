@@ -9,6 +9,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from ..surface.barycentric import weighted
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
@@ -213,7 +214,7 @@ def _onto(
     chosen = np.flatnonzero(matched)
     corners = target.vertices[target.faces]
     face, barycentric = nearest_triangles(corners, vertices[chosen], np.empty((len(chosen), 0), int))
-    point = np.einsum("qk,qkd->qd", barycentric, corners[face])
+    point = weighted(corners[face], barycentric)
     normals = TriangleMesh(vertices, rest.faces).vertex_normals()[chosen] * (-1 if reflected else 1)
     at_rim = ((barycentric <= 1e-12) & (target.twins.reshape(-1, 3)[face] < 0)).any(axis=1)
     near = np.linalg.norm(point - vertices[chosen], axis=1) <= spacing

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..align.result.confidence import BOUND
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.topology import topology
@@ -41,8 +42,8 @@ def settled(found: Correspondence, source: TriangleMesh, target: TriangleMesh) -
     points = SurfacePoints(source, topology(source).boundary_loops, 0.01 * source.diagonal)
     own, normals = target.vertices[located], target.vertex_normals()[located]
     face, place = points.nearest_point(own, normals)
-    there = np.einsum("qk,qkd->qd", place, source.vertices[source.faces[face]])
-    given = np.einsum("qk,qkd->qd", found.barycentric[located], source.vertices[source.faces[found.face[located]]])
+    there = interpolated(source.vertices, source.faces[face], place)
+    given = interpolated(source.vertices, source.faces[found.face[located]], found.barycentric[located])
     on_it = np.linalg.norm(there - own, axis=1) <= ON_SURFACE * source.diagonal
     agrees = np.linalg.norm(there - given, axis=1) <= BOUND / 2 * source.diagonal
     if (on_it & agrees).mean() < NEARLY_ALL:
@@ -67,7 +68,7 @@ def _spread(faces: Integers, barycentric: Floats, left: Booleans, source: Triang
         vertex, first = np.unique(pairs[:, 1], return_index=True)
         start = faces[pairs[first, 0]]
         face, place, off = nearest_from(source, beyond, start[:, None], target.vertices[vertex])
-        there = np.einsum("qk,qkd->qd", place, normals[0][source.faces[face]])
+        there = interpolated(normals[0], source.faces[face], place)
         good = (off <= ON_SURFACE * source.diagonal) & ((there * normals[1][vertex]).sum(axis=1) > 0)
         faces[vertex[good]], barycentric[vertex[good]] = face[good], place[good]
         left[vertex[good]] = False

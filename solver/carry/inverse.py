@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Integers, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from .correspond import Correspondence
@@ -56,7 +57,7 @@ def inverted(found: Correspondence, source: TriangleMesh, target: TriangleMesh) 
             continue
         surface = SurfacePoints(TriangleMesh(places, corners[with_it]), (), ALIKE * source.diagonal)
         at, where = surface.nearest_point(source.vertices[mine], normals[mine])
-        near = np.einsum("qk,qkd->qd", where, places[corners[with_it][at]])
+        near = interpolated(places, corners[with_it][at], where)
         off = np.linalg.norm(near - source.vertices[mine], axis=1)
         face[mine] = rows[with_it[at]]
         weights[mine] = where[:, [0, 2, 1]] if turned else where

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from ..surface.barycentric import interpolated, weighted
 from ..surface.mesh import Floats, Integers, TriangleMesh, face_neighbours
 from ..surface.nearest import nearest_in_triangle
 
@@ -58,7 +59,7 @@ class Walk:
 
     def places(self, face: Integers, weights: Floats) -> Floats:
         """Return points in space, (q, 3); nan where there is no face."""
-        found = np.einsum("qk,qkd->qd", weights, self.mesh.vertices[self.mesh.faces[face]])
+        found = interpolated(self.mesh.vertices, self.mesh.faces[face], weights)
         return np.where((face >= 0)[:, None], found, np.nan)
 
     def way(self, faces: Integers, weights: Floats, shares: Floats, end: int, goal: Floats) -> Integers | None:
@@ -90,7 +91,7 @@ class Walk:
             for column in near.T:
                 corners = self.mesh.vertices[self.mesh.faces[column]]
                 here = nearest_in_triangle(points[going], corners)
-                off = np.einsum("qk,qkd->qd", here, corners) - points[going]
+                off = weighted(corners, here) - points[going]
                 distance = np.einsum("qd,qd->q", off, off)
                 nearer = distance < best * (1 - 1e-12)
                 best[nearer], chosen[nearer], where[nearer] = distance[nearer], column[nearer], here[nearer]

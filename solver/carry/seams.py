@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..surface.barycentric import interpolated, weighted
 from ..surface.mesh import Booleans, Floats, Integers
 from ..surface.nearest import nearest_in_triangle
 from .charts import Charts
@@ -22,7 +23,7 @@ def middles(place: Floats, known: Booleans, group: Integers) -> tuple[Floats, In
     triangle[group[order]] = order
     triangle[triangle >= 0] = np.where(known[triangle].any(axis=1), triangle, -1)[triangle >= 0]
     share = known[triangle] / np.maximum(known[triangle].sum(axis=1, keepdims=True), 1)
-    return np.einsum("gk,gkd->gd", share, place[triangle]), triangle
+    return weighted(place[triangle], share), triangle
 
 
 def anchors_of(
@@ -51,7 +52,7 @@ def nearest_triangles(corners: Floats, query: Floats, guesses: Integers) -> tupl
 
     def attempt(rows: Integers, triangle: Integers) -> None:
         weights = nearest_in_triangle(query[rows], corners[triangle])
-        distance = np.linalg.norm(np.einsum("qk,qkd->qd", weights, corners[triangle]) - query[rows], axis=1)
+        distance = np.linalg.norm(weighted(corners[triangle], weights) - query[rows], axis=1)
         nearer = distance < best_distance[rows]
         rows = rows[nearer]
         best[rows], best_distance[rows], best_weights[rows] = triangle[nearer], distance[nearer], weights[nearer]
@@ -99,8 +100,8 @@ def on_side_of_anchor(
     total = kept.sum(axis=1)
     found = at_home | (total > 1e-6)
     kept[~at_home] /= np.maximum(total, 1e-6)[~at_home, None]
-    values = np.einsum("qk,qkd->qd", kept, flat[corner])
-    values[at_home] = np.einsum("qk,qkd->qd", weights[at_home], flat[own[at_home]])
+    values = interpolated(flat, corner, kept)
+    values[at_home] = interpolated(flat, own[at_home], weights[at_home])
 
     speed = np.maximum(_speed(charts, vertices, face), _speed(charts, vertices, anchor_face))
     gap = np.linalg.norm(values - anchor_value, axis=1)

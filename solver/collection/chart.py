@@ -16,6 +16,7 @@ from ..align.surfaces.prepared import Surface
 from ..flatten.domain import Domain
 from ..flatten.locate import TriangulatedDisc
 from ..mobius import Mobius, SphereMobius
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Booleans, Floats, Integers, Places
 from ..surface.tidy import Cleaned
 
@@ -71,7 +72,7 @@ class Chart:
     def positions(self, places: Places) -> Floats:
         """Return where points of the domain, (q,), lie on the surface, (q, 3)."""
         face, weights = self.triangles.locate(places)
-        return np.einsum("qk,qkd->qd", weights, self.vertices[self.faces[face]])
+        return interpolated(self.vertices, self.faces[face], weights)
 
 
 @dataclass(frozen=True, eq=False)

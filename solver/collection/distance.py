@@ -16,6 +16,7 @@ from scipy.sparse import csc_array, csr_array, dia_array
 from scipy.spatial import KDTree
 
 from ..flatten.sphere import Flat
+from ..surface.barycentric import interpolated
 from ..surface.cholesky import factorised
 from ..surface.laplacian import laplacian
 from ..surface.mesh import Floats, Integers, Places
@@ -94,7 +95,7 @@ class EvenFlow:
         face, weights = self.surface.triangles.locate(places)
         corners = self.surface.mesh.faces[face]
         there = (1 - time) * (weights * density[corners]).sum(axis=1) + time
-        return np.einsum("qk,qk...->q...", weights / there[:, None], drift[corners])
+        return interpolated(drift, corners, weights / there[:, None])
 
     def _gradient(self, values: Floats) -> Places:
         """Return the surface's gradient of values at vertices, (n,), as motion in the domain: means over the faces."""
@@ -138,7 +139,7 @@ def continuous_procrustes(
     corners = source.surface.mesh.faces
     start = source.surface.domain.mean(source.surface.places, corners[face[points]], barycentric[points])
     ends, weights = source.surface.triangles.locate(source.evened(start, face[known], barycentric[known], areas))
-    onto = np.einsum("qk,qkd->qd", weights, source.vertices[corners[ends]]) / np.sqrt(source.surface.mesh.area)
+    onto = interpolated(source.vertices, corners[ends], weights) / np.sqrt(source.surface.mesh.area)
     exact = target.mesh.vertices if target.exact is None else target.exact
     here = exact[points] / np.sqrt(target.mesh.area)
     # each vertex's area counts at the nearest of the points

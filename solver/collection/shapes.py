@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..carry.fill import HarmonicFill
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Booleans, Floats, Integers, Places, TriangleMesh
 from ..surface.nearest import SurfacePoints
 from ..surface.superimposing import Pose, superimposing
@@ -169,5 +170,5 @@ def on_surface(chart: Chart, points: Floats) -> tuple[Places, Floats]:
     surface = SurfacePoints(mesh, (), 0.0)
     face, weights = surface.nearest_point(points, np.zeros_like(points), 16)
     corners = chart.faces[face]
-    nearest = np.einsum("qk,qkd->qd", weights, chart.vertices[corners])
+    nearest = interpolated(chart.vertices, corners, weights)
     return chart.domain.mean(chart.places, corners, weights), np.linalg.norm(nearest - points, axis=1)

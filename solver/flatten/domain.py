@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from ..mobius import Mobius, SphereMobius
+from ..surface.barycentric import interpolated
 from ..surface.mesh import Floats, Integers, Places, TriangleMesh
 from .distortion import signed_areas, signed_volumes
 from .locate import TriangulatedDisc, TriangulatedSphere, plane
@@ -157,7 +158,7 @@ class Sphere:
 
     def mean(self, places: Places, corners: Integers, barycentric: Floats) -> Places:
         """Return the places in triangles."""
-        points = np.einsum("qk,qkd->qd", barycentric, places[corners])
+        points = interpolated(places, corners, barycentric)
         return points / np.linalg.norm(points, axis=1, keepdims=True)
 
     def areas(self, places: Places, faces: Integers) -> Floats:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from .barycentric import interpolated, weighted
 from .kept import kept
 from .mesh import Booleans, Floats, Integers, TriangleMesh, first_corners
 
@@ -149,9 +150,7 @@ class SurfacePoints:
         """Return points of the surface: position, (q, 3), unit normal, (q, 3), and whether on a boundary, (q,)."""
         corners = self.mesh.faces[face]
         beyond = (self._on_rim[corners] | (barycentric < 1e-9)).all(axis=1)
-        position, normal = (
-            np.einsum("qk,qkd->qd", barycentric, values[corners]) for values in (self.mesh.vertices, self.normals)
-        )
+        position, normal = (interpolated(values, corners, barycentric) for values in (self.mesh.vertices, self.normals))
         return position, _unit(normal), beyond
 
     def _near(
@@ -187,7 +186,7 @@ class SurfacePoints:
             tried, query = faces[rows], np.repeat(points[rows], count, axis=0)
             corners = places[self.mesh.faces[tried.ravel()]]
             weights = nearest_in_triangle(query, corners)
-            apart = np.einsum("qk,qkd->qd", weights, corners) - query
+            apart = weighted(corners, weights) - query
             best = _dot(apart, apart).reshape(-1, count).argmin(axis=1)
             each = np.arange(len(tried))
             face[rows], barycentric[rows] = tried[each, best], weights.reshape(-1, count, 3)[each, best]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .barycentric import weighted
 from .mesh import Floats, Integers, TriangleMesh, directed_edges, edges_of_sides, twin_sides
 from .nearest import nearest_in_triangle
 
@@ -54,7 +55,7 @@ def nearest_from(
 
     def apart(faces: Integers, rows: Integers) -> tuple[Floats, Floats]:
         weights = nearest_in_triangle(points[rows], corners[faces])
-        off = np.einsum("qk,qkd->qd", weights, corners[faces]) - points[rows]
+        off = weighted(corners[faces], weights) - points[rows]
         return weights, (off**2).sum(axis=1)
 
     for start in starts.T:

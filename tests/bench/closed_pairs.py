@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from solver import TriangleMesh, topology
+from solver.surface.barycentric import interpolated
 from tests.bench.correspondence.pairs import Pair, Places, Shape, pair, tooth
 from tests.bench.correspondence.store import Store
 from tests.bench.heads.people import read_head
@@ -73,7 +74,7 @@ def cortex(store: Store) -> Iterator[Pair]:
     for source, target in ((left, right), (right, left)):
         face = rng.choice(len(target.faces), 20_000, p=target.face_areas / target.area)
         share = rng.dirichlet(np.ones(3), len(face))
-        truth = np.einsum("qk,qkd->qd", share, source.vertices[source.faces[face]])
+        truth = interpolated(source.vertices, source.faces[face], share)
         yield Pair("cortex", f"{source.name} > {target.name}", source, target, Places(face, share, truth), None)
     yield from _both_ways("cortex, meshed anew", Shape(left), Shape(right), store, 0)
 

@@ -17,6 +17,7 @@ from scipy.special import expit
 
 from solver import Alignment, AlignSettings, align
 from solver.align.result.confidence import BOUND, COLUMNS
+from solver.surface.barycentric import interpolated
 
 from .correspondence.pairs import Pair
 from .correspondence.sets import SETS
@@ -53,7 +54,7 @@ def observed(pair: Pair, store: Store, wrong: str = "") -> dict[str, tuple[np.nd
         result = {}
         for name, alignment in (("dense", found), ("mobius", before)):
             face, barycentric = alignment.located
-            places = np.einsum("qk,qkd->qd", barycentric, pair.source.vertices[pair.source.faces[face]])
+            places = interpolated(pair.source.vertices, pair.source.faces[face], barycentric)
             missed = pair.known.carried(pair.target, places) - pair.known.truth
             result[f"{name}_error"] = np.linalg.norm(missed, axis=1) / pair.source.diagonal
             result[f"{name}_evidence"] = pair.known.carried(pair.target, _evidence(alignment))

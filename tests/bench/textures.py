@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.surface.barycentric import interpolated, weighted
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "addon"), str(ROOT / "tests" / "bench")]
 
@@ -191,18 +193,18 @@ def judged(pixels: np.ndarray, uv: np.ndarray, target: TriangleMesh, whole: Tria
     weights = rng.dirichlet((1, 1, 1), TEXELS)
     # at the middle of the texel that the point lies in, if that is in the triangle too
     size = len(pixels)
-    at = (np.floor(np.einsum("qk,qkd->qd", weights, uv[face]) * size) + 0.5) / size
+    at = (np.floor(weighted(uv[face], weights) * size) + 0.5) / size
     a, b = (uv[face, k] - uv[face, 0] for k in (1, 2))
     square = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     p = at - uv[face, 0]
     v, w = (p[:, 0] * b[:, 1] - p[:, 1] * b[:, 0]) / square, (a[:, 0] * p[:, 1] - a[:, 1] * p[:, 0]) / square
     inside = (v > 0) & (w > 0) & (v + w < 1)
     weights, face, at = np.stack([1 - v - w, v, w], axis=1)[inside], face[inside], at[inside]
-    place = np.einsum("qk,qkd->qd", weights, target.vertices[target.faces[face]])
+    place = interpolated(target.vertices, target.faces[face], weights)
     points = SurfacePoints(whole, topology(whole).boundary_loops, 0.01 * whole.diagonal)
     normal = target.face_vectors[face] / np.linalg.norm(target.face_vectors[face], axis=1, keepdims=True)
     there, share = points.nearest_point(place, normal)
-    truth = field(np.einsum("qk,qkd->qd", share, neutral.vertices[neutral.faces[there]]), neutral.diagonal)
+    truth = field(interpolated(neutral.vertices, neutral.faces[there], share), neutral.diagonal)
     truth = encoded(truth.astype(np.float32), srgb=True) / 255
     column, row = (at * size).astype(int).T
     error = np.abs(pixels[row, column, :3] / 255 - truth)

@@ -20,6 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.surface.barycentric import interpolated
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "addon")]
 
@@ -81,7 +83,7 @@ def on_surface(mesh: TriangleMesh, values: np.ndarray, where: TriangleMesh) -> n
     """Values at the vertices of a mesh, at the vertices of another that lies on it."""
     points = SurfacePoints(mesh, topology(mesh).boundary_loops, 0.01 * mesh.diagonal)
     face, barycentric = points.nearest_point(where.vertices, where.vertex_normals())
-    return np.einsum("qk,qkd->qd", barycentric, values[mesh.faces[face]])
+    return interpolated(values, mesh.faces[face], barycentric)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from ...flatten.sphere import Flat
 from ...surface.descriptors import DIFFUSION_TIMES
-from ...surface.mesh import Booleans, Floats, Integers
+from ...surface.mesh import Booleans, Floats
 
 FELT = 2 * np.tile(np.sqrt(DIFFUSION_TIMES), 2)
 """How far from a boundary each column of the descriptors feels it, (d,), in roots of the area: what one implicit step
@@ -30,11 +30,6 @@ def depths(flat: Flat) -> Floats:
 def felt_inside(depth: Floats) -> Booleans:
     """Return which columns of the descriptors, (..., d), feel no boundary that is so far away, (...,)."""
     return depth[..., None] > FELT
-
-
-def interpolated(flat: Flat, values: Floats, face: Integers, barycentric: Floats) -> Floats:
-    """Return values at vertices, (n,) or (n, d), at points of the surface, (q,) or (q, d)."""
-    return np.einsum("qk,qk...->q...", barycentric, values[flat.mesh.faces[face]])
 
 
 def difference(unlike: Floats, tells: Booleans) -> Floats:

@@ -15,6 +15,7 @@ from ...bend.pose import FAR, misfit
 from ...flatten.sphere import Flat
 from ...search.outcome import SearchResult
 from ...stages import Part
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
 from ...surface.superimposing import superimposing
@@ -141,7 +142,7 @@ def _in_pose(matched: Alignment, onto: SurfacePoints, start: TriangleMesh, refle
     x = start.vertices[used]
     face, barycentric = onto.nearest_point(x, start.vertex_normals()[used])
     corners = onto.mesh.faces[face]
-    near = np.linalg.norm(np.einsum("qk,qkd->qd", barycentric, onto.mesh.vertices[corners]) - x, axis=1) < FAR
+    near = np.linalg.norm(interpolated(onto.mesh.vertices, corners, barycentric) - x, axis=1) < FAR
     there = found.source.domain.mean(found.source.places, corners, barycentric)
     weights = target.mesh.vertex_areas[used] * near * (found.source.domain.depth(there) > 1e-6)
     mobius = implied(there, target.places[used], weights, reflected)

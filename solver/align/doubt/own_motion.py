@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...bend.draft import facing, ready
 from ...bend.pose import HELD, POSE_SETTLED
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.sampling import spread
 from ...surface.superimposing import superimposing
@@ -23,7 +24,7 @@ from ..result.alignment import Alignment
 from ..result.confidence import MATCHED, SURE
 from ..surfaces.remark import Remark
 from .decision import OPPOSITE
-from .deep_inside import depths, difference, explained, felt_inside, interpolated
+from .deep_inside import depths, difference, explained, felt_inside
 from .likely_motion import BORNE_OUT, ELSEWHERE, LEAST, Likely
 from .own_fit import FAR, OwnFit
 
@@ -109,13 +110,13 @@ def motions(found: Alignment) -> Iterator[Motion]:
     source = found.source
     own = OwnFit(ready(source))
     diagonal = own.onto.mesh.diagonal
-    face, barycentric = found.located
-    here = face[some], barycentric[some]
-    points, normals, _ = own.onto.at(*here)
+    face, barycentric = found.located[0][some], found.located[1][some]
+    here = source.mesh.faces[face], barycentric
+    points, normals, _ = own.onto.at(face, barycentric)
     points[~matched], normals[~matched] = _carried(found, some, matched, points)
     deep, descriptors, wanted = depths(source), found.source_descriptors, found.target_descriptors[some]
-    depth = np.minimum(depths(found.target)[some], interpolated(source, deep, *here))
-    unlike_here = wanted - interpolated(source, descriptors, *here)
+    depth = np.minimum(depths(found.target)[some], interpolated(deep, *here))
+    unlike_here = wanted - interpolated(descriptors, *here)
     likely = Likely(own, points, normals, (wanted, depth), (descriptors, deep))
     for turn, shift in likely.motions(SHARE):
         turn, shift = _settled(own, points, normals, turn, shift)
@@ -126,9 +127,10 @@ def motions(found: Alignment) -> Iterator[Motion]:
         if back or borne_out < BORNE_OUT or share < LEAST * matched.mean():
             continue
         both = own.lying(there, up, FAR)[1] & matched
-        elsewhere = own.onto.nearest_point(there, up)
-        tells = felt_inside(np.minimum(depth, interpolated(source, deep, *elsewhere))) & both[:, None]
-        unlike_there = wanted - interpolated(source, descriptors, *elsewhere)
+        face, barycentric = own.onto.nearest_point(there, up)
+        elsewhere = source.mesh.faces[face], barycentric
+        tells = felt_inside(np.minimum(depth, interpolated(deep, *elsewhere))) & both[:, None]
+        unlike_there = wanted - interpolated(descriptors, *elsewhere)
         more = difference(unlike_there, tells) - difference(unlike_here, tells)
         more = more[tells.any(axis=1)]
         if len(more) < 4:

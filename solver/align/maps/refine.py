@@ -12,6 +12,7 @@ from ...flatten.domain import Domain
 from ...flatten.flatten import Flattening
 from ...flatten.locate import TriangulatedDisc
 from ...flatten.sphere import Flat
+from ...surface.barycentric import weighted
 from ...surface.mesh import Floats, Integers, Places
 from ...surface.sampling import HORIZON
 from .deep_ends import end_to_end
@@ -113,7 +114,7 @@ class _Agreement:
         place = trial(self.points)
         face, barycentric = self.disc.locate(place, near)
         there = self.target_descriptors[self.disc.faces[face]]
-        residual = self.expected - np.einsum("qk,qkd->qd", barycentric, there)
+        residual = self.expected - weighted(there, barycentric)
         term = self.weights * np.exp(-(residual**2).sum(axis=1) / (2 * self.scale**2))
         return float(term.sum()), place, face, residual, term
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Floats, Integers
 from ..result.alignment import Alignment
 from ..result.confidence import DOUBTFUL
@@ -45,7 +46,7 @@ def _places(found: Alignment, vertices: Integers) -> Floats:
     """Return where target vertices, (q,), lie on the source, (q, 3)."""
     face, barycentric = found.located
     source = found.source.mesh
-    return np.einsum("qk,qkd->qd", barycentric[vertices], source.vertices[source.faces[face[vertices]]])
+    return interpolated(source.vertices, source.faces[face[vertices]], barycentric[vertices])
 
 
 def _apart(found: Alignment, vertices: Integers) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Floats, Integers
 from ...surface.parts import Part, Parts
 from ..result.alignment import Alignment
@@ -123,7 +124,7 @@ class _Main:
             turned = from_tidy.reversed[face]
             barycentric = np.where(turned[:, None], barycentric[:, [0, 2, 1]], barycentric)
             face = from_tidy.faces[face]
-        there = np.einsum("qk,qkd->qd", barycentric, source.mesh.vertices[source.mesh.faces[face]])
+        there = interpolated(source.mesh.vertices, source.mesh.faces[face], barycentric)
         return _Main(vertices, face, barycentric, target.mesh.vertices[vertices], there, weight, certainty)
 
     def space(self, mirrored: bool) -> SpaceMap:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...bend.plate import NORMAL_WEIGHT, relaxed
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
 from ...surface.parts import Part
@@ -93,7 +94,7 @@ class _Near:
         """Return the points of the counterpart that the vertices, (q, 3), are nearest to."""
         onto = SurfacePoints(self.source, (), NORMAL_WEIGHT)
         face, barycentric = onto.nearest_point(bent, TriangleMesh(bent, self.target.faces).vertex_normals())
-        reached = np.einsum("qk,qkd->qd", barycentric, self.source.vertices[self.source.faces[face]])
+        reached = interpolated(self.source.vertices, self.source.faces[face], barycentric)
         return PartMap(face, barycentric, self.size * np.linalg.norm(reached - bent, axis=1))
 
 
@@ -179,5 +180,5 @@ def _runs_against(mesh: TriangleMesh, onto: SurfacePoints) -> bool:
     """Return whether the normals of two surfaces that lie on each other point to opposite sides."""
     normals = mesh.vertex_normals()
     face, barycentric = onto.nearest_point(mesh.vertices, np.zeros_like(normals))
-    there = np.einsum("qk,qki->qi", barycentric, onto.mesh.vertex_normals()[onto.mesh.faces[face]])
+    there = interpolated(onto.mesh.vertex_normals(), onto.mesh.faces[face], barycentric)
     return float(np.einsum("qi,qi->q", normals, there) @ mesh.vertex_areas) < 0

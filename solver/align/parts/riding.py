@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...surface.barycentric import interpolated, weighted
 from ...surface.mesh import Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
 from ...surface.parts import Parts
@@ -146,7 +147,7 @@ def _beside(known: Known, source: Parts, surface: SurfacePoints, vertices: Integ
     # the point between the places of three vertices, in the part of the source that these lie in
     mesh = source.mesh
     there = np.einsum("qkj,qkjd->qkd", known.barycentric[corner], mesh.vertices[mesh.faces[known.face[corner]]])
-    point = np.einsum("qk,qkd->qd", weights, there)
+    point = weighted(there, weights)
     face, barycentric = np.empty(len(here), np.intp), np.empty((len(here), 3))
     part_of = source.of_face[known.face[leader]]
     for one in np.unique(part_of):
@@ -166,5 +167,5 @@ def _on_part(source: Parts, number: int, points: Floats) -> tuple[Integers, Floa
 def _nearest(surface: SurfacePoints, points: Floats) -> tuple[Integers, Floats]:
     """Return the face that is nearest to each of some points, (q, 3), and how far off it is, (q,)."""
     at, weights = surface.nearest_point(points, np.zeros_like(points))
-    reached = np.einsum("qk,qkd->qd", weights, surface.mesh.vertices[surface.mesh.faces[at]])
+    reached = interpolated(surface.mesh.vertices, surface.mesh.faces[at], weights)
     return at, np.linalg.norm(reached - points, axis=1)

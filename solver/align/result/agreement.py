@@ -7,6 +7,7 @@ import numpy as np
 from ...flatten.distortion import log_conformal_factor
 from ...flatten.sphere import Flat
 from ...mobius import Mobius, SphereMobius
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Floats, Integers, Places
 from ...surface.statistics import weighted_median
 
@@ -19,7 +20,7 @@ def descriptor_distance(
     source: Flat, source_descriptors: Floats, target_descriptors: Floats, face: Integers, barycentric: Floats
 ) -> Floats:
     """Return the distance, (q,), of descriptors of target points, (q, d), from those at points of the source."""
-    there = np.einsum("qk,qkd->qd", barycentric, source_descriptors[source.mesh.faces[face]])
+    there = interpolated(source_descriptors, source.mesh.faces[face], barycentric)
     return np.sqrt(((there - target_descriptors) ** 2).sum(axis=1))
 
 
@@ -39,7 +40,7 @@ def log_stretch(
     """
     source_factor = log_conformal_factor(source.mesh, source.places)
     carried_factor = log_conformal_factor(target.mesh, carried)[used]
-    return carried_factor - np.einsum("qk,qk->q", barycentric, source_factor[source.mesh.faces[face]])
+    return carried_factor - interpolated(source_factor, source.mesh.faces[face], barycentric)
 
 
 def trust(

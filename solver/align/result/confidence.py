@@ -12,6 +12,7 @@ from scipy.special import expit
 
 from ...flatten.sphere import Flat
 from ...mobius import Mobius, SphereMobius
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Floats, Integers, Places
 from ...surface.statistics import weighted_median
 from .agreement import descriptor_distance, log_stretch
@@ -113,7 +114,7 @@ def evidence(
     stretch = log_stretch(source, target, carried, face, barycentric, used)
     stretch -= weighted_median(stretch, target.mesh.vertex_areas[used])
     vertices, faces = source.mesh.vertices, source.mesh.faces
-    places = np.einsum("qk,qkd->qd", barycentric, vertices[faces[face]])
+    places = interpolated(vertices, faces[face], barycentric)
     near = np.zeros(len(used))
     if source.loops:
         rim = vertices[np.concatenate(source.loops)]
@@ -123,7 +124,7 @@ def evidence(
         mobius, above, unfolded = bending
         start = mobius.inverse()(target.places[used])
         there, weights = source.triangles.locate(start)
-        moved = np.linalg.norm(np.einsum("qk,qkd->qd", weights, vertices[faces[there]]) - places, axis=1) / root
+        moved = np.linalg.norm(interpolated(vertices, faces[there], weights) - places, axis=1) / root
         offset = above[used]
     return np.stack(
         [

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from ...bend.draft import Draft
 from ...bend.plate import RIM_REACH
 from ...flatten.sphere import Flat
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Booleans, Floats, Integers, TriangleMesh
 from ...surface.nearest import SurfacePoints
 from ...surface.topology import regions
@@ -82,7 +83,7 @@ def depth_beyond(
     on_rim = np.zeros(len(vertices), bool)
     on_rim[np.concatenate(surface.loops)] = True
     edge = np.flatnonzero((on_rim[faces[face]] | (barycentric < 1e-9)).all(axis=1))
-    at = np.einsum("qk,qkd->qd", barycentric[edge], vertices[faces[face[edge]]])
+    at = interpolated(vertices, faces[face[edge]], barycentric[edge])
     up = surface.mesh.face_vectors[face[edge]]
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), np.finfo(float).tiny)
     step = points[edge] - at

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...surface.barycentric import interpolated
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.walking import STEPS, nearest_from
 from .carrying import Carrying
@@ -77,8 +78,8 @@ def _place(carrying: Carrying, layout: Floats, result: npt.NDArray[Any], rows: I
     vertex = carrying.target.faces[triangle]
     corner = result["corner"][rows].astype(np.float64)
     weights = np.column_stack([1 - corner.sum(axis=1), corner])
-    point = np.einsum("qk,qkd->qd", weights, carrying.place[vertex])
-    normal = np.einsum("qk,qkd->qd", weights, carrying.normal[vertex])
+    point = interpolated(carrying.place, vertex, weights)
+    normal = interpolated(carrying.normal, vertex, weights)
     start = np.take_along_axis(carrying.at[vertex], weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     face, place, outside = _walk(carrying, start, point, normal)
     for k in range(3):
@@ -146,6 +147,6 @@ def _walk(carrying: Carrying, start: Integers, point: Floats, normal: Floats) ->
 
 def _astray(carrying: Carrying, face: Integers, place: Floats, point: Floats, vertex: Integers) -> Booleans:
     """Return which places on faces are farther from points than the farthest of the places that these lie between."""
-    found = np.einsum("qk,qkd->qd", place, carrying.source.vertices[carrying.source.faces[face]])
+    found = interpolated(carrying.source.vertices, carrying.source.faces[face], place)
     reach = ((carrying.place[vertex] - point[:, None]) ** 2).sum(axis=2).max(axis=1)
     return ((found - point) ** 2).sum(axis=1) > reach

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from solver import TriangleMesh, topology
+from solver.surface.barycentric import weighted
 
 
 def decimated(mesh: TriangleMesh, share: float) -> TriangleMesh:
@@ -69,7 +70,7 @@ def moved(mesh: TriangleMesh, seed: int) -> TriangleMesh:
     for loop in topology(mesh).boundary_loops:  # none where it is closed
         share[loop] = 0
     corners = mesh.vertices[mesh.faces[around]]
-    shift = np.einsum("nk,nkd->nd", share, corners - mesh.vertices[:, None]) / 2
+    shift = weighted(corners - mesh.vertices[:, None], share) / 2
     for _ in range(12):
         result = TriangleMesh(mesh.vertices + shift, mesh.faces, mesh.name)
         along = (result.face_vectors * mesh.face_vectors).sum(axis=1)

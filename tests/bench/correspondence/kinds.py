@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import TriangleMesh, cleaned, topology
+from solver.surface.barycentric import interpolated
 from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import bumps, posed
 
@@ -65,7 +66,7 @@ def _on_source(clean: Pair, source: TriangleMesh) -> Places:
     normals = clean.source.vertex_normals()
     guess = normals[clean.source.faces].mean(axis=1)
     face, weights = nearest(clean.onto, clean.surface.truth, guess[_nearest_faces(clean, clean.surface.truth)])
-    return replace(clean.surface, truth=np.einsum("qk,qkd->qd", weights, source.vertices[source.faces[face]]))
+    return replace(clean.surface, truth=interpolated(source.vertices, source.faces[face], weights))
 
 
 def _nearest_faces(clean: Pair, points: np.ndarray) -> np.ndarray:
@@ -85,9 +86,9 @@ def depth_scans(store: Store, count: int | None) -> Iterator[Pair]:
         scan = TriangleMesh(kept["vertices"], kept["faces"], f"{target.mesh.name} seen")
         face = rng.choice(len(scan.faces), 20_000, p=scan.face_areas / scan.area)
         barycentric = rng.dirichlet(np.ones(3), len(face))
-        position = np.einsum("qk,qkd->qd", barycentric, scan.vertices[scan.faces[face]])
+        position = interpolated(scan.vertices, scan.faces[face], barycentric)
         there, weights = nearest(surface_points(target.mesh), position, scan.face_vectors[face])
-        truth = np.einsum("qk,qkd->qd", weights, source.mesh.vertices[source.mesh.faces[there]])
+        truth = interpolated(source.mesh.vertices, source.mesh.faces[there], weights)
         good = np.ones(len(face), bool) if target.known is None else target.known[there]
         known = Places(face[good], barycentric[good], truth[good])
         # what the mouth and the nose hide from the camera leaves openings
@@ -151,9 +152,9 @@ def coarse(store: Store, count: int | None) -> Iterator[Pair]:
         for k, (source, target) in enumerate(((few, fine), (fine, few))):
             face = rng.choice(len(target.faces), 5000, p=target.face_areas / target.area)
             barycentric = rng.dirichlet(np.ones(3), len(face))
-            position = np.einsum("qk,qkd->qd", barycentric, target.vertices[target.faces[face]])
+            position = interpolated(target.vertices, target.faces[face], barycentric)
             there, weights = nearest(surface_points(source), position, target.face_vectors[face])
-            truth = np.einsum("qk,qkd->qd", weights, source.vertices[source.faces[there]])
+            truth = interpolated(source.vertices, source.faces[there], weights)
             known = Places(face, barycentric, truth)
             name = f"{len(source.faces)} > {len(target.faces)} triangles, {seed}"
             yield Pair("coarse", name, source, posed(target, 2 * seed + k), known, None)

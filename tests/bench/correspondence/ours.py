@@ -11,6 +11,7 @@ from solver import Alignment, AlignSettings, Mobius, align, correspond, search
 from solver.align.surfaces.objective import source_points
 from solver.flatten.locate import TriangulatedDisc
 from solver.search.fit import algebraic_fit, fitted
+from solver.surface.barycentric import interpolated
 from solver.surface.descriptors import diffused_curvatures
 from solver.surface.statistics import standardised
 
@@ -100,7 +101,7 @@ def best_mobius(pair: Pair, store: Store) -> Map:
     def error(x: np.ndarray) -> float:
         back = _mobius(x).inverse()(there)
         face, weights = disc.locate(np.conj(back) if pair.reflected else back)
-        position = np.einsum("qk,qkd->qd", weights, pair.source.vertices[pair.source.faces[face]])
+        position = interpolated(pair.source.vertices, pair.source.faces[face], weights)
         return float(np.linalg.norm(position - places.truth, axis=1).mean()) / pair.source.diagonal
 
     def made() -> dict[str, np.ndarray]:

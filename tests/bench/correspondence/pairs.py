@@ -8,6 +8,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from solver import Flattening, TriangleMesh, flatten, topology
+from solver.surface.barycentric import interpolated
 from solver.surface.nearest import SurfacePoints
 from tests.bench.paper.data import DATA, absent, read
 from tests.solver.scans import posed
@@ -40,7 +41,7 @@ class Places:
 
     def carried(self, target: TriangleMesh, values: np.ndarray) -> np.ndarray:
         """Return values at the target's vertices, (n, ...), linear in each triangle, at the points, (q, ...)."""
-        return np.einsum("qk,qk...->q...", self.barycentric, values[target.faces[self.face]])
+        return interpolated(values, target.faces[self.face], self.barycentric)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,10 +171,10 @@ def pair(
         rng = np.random.default_rng(seed)
         face = rng.choice(len(small.faces), POINTS, p=small.face_areas / small.area)
         barycentric = rng.dirichlet(np.ones(3), POINTS)
-        position = np.einsum("qk,qkd->qd", barycentric, small.vertices[small.faces[face]])
+        position = interpolated(small.vertices, small.faces[face], barycentric)
         normal = small.face_vectors[face] / np.maximum(2 * small.face_areas[face, None], 1e-300)
         there, weights = nearest(on_whole, position, normal)
-        truth = np.einsum("qk,qkd->qd", weights, source.mesh.vertices[source.mesh.faces[there]])
+        truth = interpolated(source.mesh.vertices, source.mesh.faces[there], weights)
         good = np.ones(POINTS, bool) if target.known is None else target.known[there]
         if source_part is not None:
             gap = _distance(shown, truth) / source.mesh.diagonal
@@ -202,7 +203,7 @@ def _distance(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
     """Return how far points, (q, 3), lie from a mesh, (q,)."""
     onto = SurfacePoints(mesh, topology(mesh).boundary_loops, 0.0)
     face, weights = nearest(onto, points, np.zeros_like(points))
-    return np.linalg.norm(np.einsum("qk,qkd->qd", weights, mesh.vertices[mesh.faces[face]]) - points, axis=1)
+    return np.linalg.norm(interpolated(mesh.vertices, mesh.faces[face], weights) - points, axis=1)
 
 
 def _arrays(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from solver import Correspondence, TriangleMesh
 from solver.carry.contacts import brought_together
 from solver.carry.frames import local_similarities
 from solver.carry.gradients import GradientTransfer
+from solver.surface.barycentric import interpolated
 from solver.surface.nearest import SurfacePoints
 from solver.surface.superimposing import superimposing
 from tests.bench.heads.people import Head
@@ -83,6 +84,6 @@ def nearest_point(head: Head, target: Target, places: np.ndarray, known: np.ndar
     back = pose.turn.T / pose.scale
 
     def carry(displacements: np.ndarray) -> np.ndarray:
-        return np.einsum("qk,qkd->qd", barycentric, displacements[head.mesh.faces[face]]) @ back
+        return interpolated(displacements, head.mesh.faces[face], barycentric) @ back
 
     return carry

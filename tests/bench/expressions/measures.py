@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.carry.contacts import Contacts, facing, find_contacts
+from solver.surface.barycentric import interpolated
 from tests.bench.heads.targets import Target
 
 MOVING = 0.05
@@ -74,7 +75,7 @@ class Score:
 def meeting_lips(places: np.ndarray, opening: np.ndarray, faces: np.ndarray) -> Contacts:
     """Return the lips, which are what meets when a jaw closes that a displacement, (n, 3), opens."""
     lips = find_contacts(places + opening, -opening, faces)
-    other = np.einsum("ck,ckd->cd", lips.barycentric, opening[lips.corners])
+    other = interpolated(opening, lips.corners, lips.barycentric)
     longest = np.linalg.norm(opening, axis=1).max()  # near the corners of the mouth both move alike
     return lips.chosen(np.linalg.norm(opening[lips.vertex] - other, axis=1) > APART * longest)
 
@@ -127,7 +128,7 @@ class Judge:
 
     def _wrong(self, lips: Contacts, got: np.ndarray) -> float:
         own = self.wanted[lips.vertex]
-        other = np.einsum("ck,ckd->cd", lips.barycentric, self.wanted[lips.corners])
+        other = interpolated(self.wanted, lips.corners, lips.barycentric)
         carried = got[lips.vertex]
         # as strong as the target's own is, since artists open jaws to different widths
         strength = max(float((carried * own).sum()) / max(float((carried**2).sum()), 1e-300), 0.0)

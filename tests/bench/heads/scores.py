@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import Correspondence
+from solver.surface.barycentric import interpolated, weighted
 
 from .people import Head
 from .scenes import Arrived, groups_of
@@ -55,7 +56,7 @@ def truth(head: Head, target: Target) -> np.ndarray:
 
 def carried(head: Head, target: Target, values: np.ndarray) -> np.ndarray:
     """Return values of the source's vertices, (n_source, ...), where the target's vertices belong."""
-    return np.einsum("qk,qk...->q...", target.barycentric, values[head.mesh.faces[target.face]])
+    return interpolated(values, head.mesh.faces[target.face], target.barycentric)
 
 
 def riding(found: Correspondence) -> np.ndarray:
@@ -95,7 +96,7 @@ def _right_corners(head: Head, target: Target, there: Arrived) -> np.ndarray:
     On a seam that is either side's: the UV of any polygon around the vertices of the triangle that it belongs in.
     """
     at = head.uv[head.triangle_corners]
-    own = np.einsum("qk,qkd->qd", target.barycentric, at[target.face])
+    own = weighted(at[target.face], target.barycentric)
     apart = np.linalg.norm(there.uv - own[target.mesh.faces], axis=2)
     right = apart < UV
     # beside seams: the other values at the nearest of the three vertices

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import TriangleMesh
+from solver.surface.barycentric import interpolated
 from solver.surface.nearest import SurfacePoints
 from tests.solver.scans import similarity
 
@@ -38,7 +39,7 @@ class Target:
 
     def own(self, head: Head, displacements: np.ndarray) -> np.ndarray:
         """Return the displacements, (n, 3), that the head's own, (n_head, 3), are here."""
-        there = np.einsum("qk,qkd->qd", self.barycentric, displacements[head.mesh.faces[self.face]])
+        there = interpolated(displacements, head.mesh.faces[self.face], self.barycentric)
         return self.scale * there @ self.turn
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 from surfaces import spherical_cap
 
-from solver import TriangleMesh, flatten
-from solver.align.doubt.deep_inside import FELT, depths, difference, explained, felt_inside, interpolated
+from solver import flatten
+from solver.align.doubt.deep_inside import FELT, depths, difference, explained, felt_inside
 from solver.surface.descriptors import diffused_curvatures
 
 
@@ -34,12 +34,6 @@ def test_what_differs_is_counted_where_it_tells_anything() -> None:
 def test_what_has_no_boundary_tells_all() -> None:
     assert felt_inside(np.full(3, np.inf)).all()
     assert (felt_inside(FELT) == (FELT[:, None] > FELT)).all()
-
-
-def test_values_inside_triangles_are_linear() -> None:
-    flat = flatten(TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5], [0.5, 0.5, 1]]), FACES))
-    there = interpolated(flat, flat.mesh.vertices, np.array([1]), np.array([[0.5, 0.25, 0.25]]))
-    assert np.allclose(there, [0.5, 0.25, 0.25] @ flat.mesh.vertices[flat.mesh.faces[1]])
 
 
 FACES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
