@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from solver.surface.barycentric import interpolated, weighted
-
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "addon"), str(ROOT / "tests" / "bench")]
 
@@ -37,6 +35,7 @@ from mobius_extension.solver import Correspondence as AddonCorrespondence  # noq
 from solver import Correspondence, TriangleMesh, align, correspond, topology  # noqa: E402
 from solver.carry.interpolate import places  # noqa: E402
 from solver.carry.textures import Carrying, FromCorners, InLayout, Wanted, encoded, resample  # noqa: E402
+from solver.surface.barycentric import interpolated, weighted  # noqa: E402
 from solver.surface.nearest import SurfacePoints  # noqa: E402
 from tests.bench.correspondence.decimation import decimated  # noqa: E402
 from tests.bench.paper.data import absent, read  # noqa: E402

@@ -20,8 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from solver.surface.barycentric import interpolated
-
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "addon")]
 
@@ -46,6 +44,7 @@ from solver import (  # noqa: E402
     correspond,
     topology,
 )
+from solver.surface.barycentric import interpolated  # noqa: E402
 from solver.surface.nearest import SurfacePoints  # noqa: E402
 from tests.bench.correspondence.decimation import decimated  # noqa: E402
 from tests.bench.paper.data import absent, read  # noqa: E402
