@@ -19,12 +19,12 @@ FELT = 2 * np.tile(np.sqrt(DIFFUSION_TIMES), 2)
 of diffusion by a time t carries falls by e each root of t, here to a seventh."""
 
 
-def depths(flat: Flat) -> Floats:
-    """Return how far vertices are from the next vertex of a boundary, (n,), in roots of the area; inf without any."""
+def depths(flat: Flat, points: Floats) -> Floats:
+    """Return how far points, (q, 3), are from the next vertex of a boundary, in roots of the area; inf without any."""
     if not flat.loops:
-        return np.full(len(flat.mesh.vertices), np.inf)
+        return np.full(len(points), np.inf)
     rim = KDTree(flat.mesh.vertices[np.concatenate(flat.loops)])
-    return rim.query(flat.mesh.vertices)[0] / np.sqrt(flat.mesh.area)
+    return rim.query(points)[0] / np.sqrt(flat.mesh.area)
 
 
 def felt_inside(depth: Floats) -> Booleans:

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...bend.draft import facing, ready
 from ...bend.pose import HELD, POSE_SETTLED
+from ...flatten.sphere import Flat
 from ...surface.barycentric import interpolated
 from ...surface.mesh import Booleans, Floats, Integers
 from ...surface.sampling import spread
@@ -114,10 +115,11 @@ def motions(found: Alignment) -> Iterator[Motion]:
     here = source.mesh.faces[face], barycentric
     points, normals, _ = own.onto.at(face, barycentric)
     points[~matched], normals[~matched] = _carried(found, some, matched, points)
-    deep, descriptors, wanted = depths(source), found.source_descriptors, found.target_descriptors[some]
-    depth = np.minimum(depths(found.target)[some], interpolated(deep, *here))
+    descriptors, wanted = found.source_descriptors, found.target_descriptors[some]
+    depth = depths(found.target, found.target.mesh.vertices[some])
+    depth = np.minimum(depth, depths(source, interpolated(source.mesh.vertices, *here)))
     unlike_here = wanted - interpolated(descriptors, *here)
-    likely = Likely(own, points, normals, (wanted, depth), (descriptors, deep))
+    likely = Likely(own, points, normals, (wanted, depth), (descriptors, _known_depths(source, own)))
     for turn, shift in likely.motions(SHARE):
         turn, shift = _settled(own, points, normals, turn, shift)
         there, up = points @ turn.T + shift, normals @ turn.T
@@ -129,7 +131,8 @@ def motions(found: Alignment) -> Iterator[Motion]:
         both = own.lying(there, up, FAR)[1] & matched
         face, barycentric = own.onto.nearest_point(there, up)
         elsewhere = source.mesh.faces[face], barycentric
-        tells = felt_inside(np.minimum(depth, interpolated(deep, *elsewhere))) & both[:, None]
+        deep = depths(source, interpolated(source.mesh.vertices, *elsewhere))
+        tells = felt_inside(np.minimum(depth, deep)) & both[:, None]
         unlike_there = wanted - interpolated(descriptors, *elsewhere)
         more = difference(unlike_there, tells) - difference(unlike_here, tells)
         more = more[tells.any(axis=1)]
@@ -143,6 +146,13 @@ def motions(found: Alignment) -> Iterator[Motion]:
             float(SURE * more.std() / np.sqrt(len(more))),
             float(explained(wanted, unlike_there, tells)),
         )
+
+
+def _known_depths(source: Flat, own: OwnFit) -> Floats:
+    """Return how far vertices are from the next boundary, (n,), in roots of the area; 0 at those nobody asks for."""
+    deep = np.zeros(len(source.mesh.vertices))
+    deep[own.known] = depths(source, source.mesh.vertices[own.known])
+    return deep
 
 
 def _carried(found: Alignment, some: Integers, matched: Booleans, places: Floats) -> tuple[Floats, Floats]:

@@ -9,7 +9,7 @@ from solver.surface.descriptors import diffused_curvatures
 def test_a_ball_is_alike_everywhere_but_where_its_boundary_is_felt() -> None:
     """Its curvatures are the same all over: what says otherwise is the boundary, and only as near as is said."""
     cap = flatten(spherical_cap(24, 2.0, 0.2)[0])
-    depth, measured = depths(cap), diffused_curvatures(cap.mesh)[:, :4]
+    depth, measured = depths(cap, cap.mesh.vertices), diffused_curvatures(cap.mesh)[:, :4]
     rim = cap.mesh.vertices[cap.boundary]
     true = np.arccos(np.clip(cap.mesh.vertices @ rim.T, -1, 1)).min(axis=1)
     assert np.allclose(2 * np.sin(true / 2) / np.sqrt(cap.mesh.area), depth)
