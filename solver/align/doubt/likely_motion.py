@@ -102,9 +102,9 @@ class Likely:
         spins = Rotation.from_rotvec(np.outer(2 * np.pi * np.arange(TURNS) / TURNS, [0.0, 0.0, 1.0])).as_matrix()
         turns, shifts, worths = [], [], []
         for begin, ends in starts:
-            here = _frame(self.normals[begin])
-            for end in ends:
-                turn = _frame(self.own.normals[end]) @ spins @ here.T
+            here = _frames(self.normals[[begin]])[0]
+            for end, there in zip(ends, _frames(self.own.normals[ends]), strict=True):
+                turn = there @ spins @ here.T
                 shift = self.own.points[end] - points[begin] @ turn.transpose(0, 2, 1)
                 moved = some @ turn.transpose(0, 2, 1) + shift[:, None]
                 lies, beyond, near = self.own.roughly(moved, facing @ turn.transpose(0, 2, 1))
@@ -134,8 +134,8 @@ class Likely:
             worth[np.linalg.norm(moved - moved[first], axis=2).mean(axis=1) < ELSEWHERE / 2] = 0
 
 
-def _frame(up: Floats) -> Floats:
-    """Return a right-handed frame, (3, 3), in columns, the third of which is a unit vector."""
-    side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    side /= np.linalg.norm(side)
-    return np.stack([side, np.cross(up, side), up], axis=1)
+def _frames(up: Floats) -> Floats:
+    """Return right-handed frames, (q, 3, 3), in columns, the third of which are unit vectors, (q, 3)."""
+    side = np.cross(up, np.eye(3)[np.argmin(np.abs(up), axis=1)])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    return np.stack([side, np.cross(up, side), up], axis=2)
