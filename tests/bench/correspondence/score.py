@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.flatten.distortion import signed_areas
+from solver.surface.barycentric import interpolated
 
 from .pairs import Pair, Places
 
@@ -30,7 +31,7 @@ class Map:
 
     def at(self, pair: Pair, values: np.ndarray) -> np.ndarray:
         """Return values at the source's vertices, (n_source, ...), carried to the target's."""
-        return np.einsum("nk,nk...->n...", self.barycentric, values[pair.source.faces[self.face]])
+        return interpolated(values, pair.source.faces[self.face], self.barycentric)
 
 
 @dataclass(frozen=True)
