@@ -9,16 +9,18 @@ from ..surfaces.remark import Remark
 from .own_mirror import mirror_plane
 
 
-def with_sides_open(found: Alignment, symmetric: bool) -> Alignment:
+def with_sides_open(found: Alignment, symmetric: bool | None) -> Alignment:
     """Return a map, with a word if it is mirrored though a surface is its own mirror image as far as it reaches.
 
-    `symmetric`: whether that is known of the source. Surfaces of which that is said by chance are none of those
-    measured (`BORNE_OUT`); nothing is said where the orientation was asked for, or is called open already.
+    `symmetric`: whether the source is, None if nobody has asked. Surfaces of which that is said by chance are none of
+    those measured (`BORNE_OUT`); nothing is said where the orientation was asked for, or is called open already.
     """
     said = any(one.kind == "orientation" for one in found.remarks)
     if not found.mobius.reflected or found.other is None or said:
         return found
-    surface = found.source if symmetric else next(filter(_symmetric, (found.source, found.target)), None)
+    if symmetric is None:
+        symmetric = _symmetric(found.source)
+    surface = found.source if symmetric else found.target if _symmetric(found.target) else None
     if surface is None:
         return found
     text = (

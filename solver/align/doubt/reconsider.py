@@ -103,7 +103,8 @@ def reconsidered(
     works = [partial(_bent, each, draft) for each, draft in chosen]
     bent = side_by_side(works, clock.within(0.5, 1.0), threads=threads)
     best = decided([(found, ""), *zip(bent, (each.what for each, _ in chosen), strict=True)])
-    return with_sides_open(best, any(each.what == SIDES for each in hypotheses))
+    symmetric = any(each.what == SIDES for each in hypotheses)
+    return with_sides_open(best, symmetric if _asks_own_mirror(matched) else None)
 
 
 _Draft = tuple[Draft, Booleans, Booleans]
@@ -192,6 +193,11 @@ def _same(one: Floats, two: Floats) -> bool:
     return bool(np.median(np.linalg.norm(one - two, axis=1)) < SAME)
 
 
+def _asks_own_mirror(matched: Alignment) -> bool:
+    """Return whether the source's own plane of symmetry is looked for, as a hypothesis (`by_own_mirror`)."""
+    return matched.mobius.reflected and matched.other is not None
+
+
 def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part) -> list[Hypothesis]:
     """Return what else the map might be: the likelier the map is wrong, the more."""
     clock.begin("reconsider", "Trying another map", 0.0)
@@ -202,7 +208,7 @@ def _hypotheses(found: Alignment, matched: Alignment, draft: Draft, clock: Part)
     if other is not None:
         what = "the mirrored one" if other.mobius.reflected else "the one that is not mirrored"
         turns.append(Hypothesis(other, None, what))
-    if other is not None and matched.mobius.reflected:
+    if other is not None and _asks_own_mirror(matched):
         works.append(lambda note: list(further(other, MAXIMA - 1, stages_of(note))))
         works.append(lambda _: [one for one in (by_own_mirror(matched, draft),) if one is not None])
     if found.mean_confidence < FITS:
