@@ -14,7 +14,7 @@ class MOBIUS_OT_choose_target(bpy.types.Operator):
 
     bl_idname = "mobius.choose_target"
     bl_label = "Choose Target"
-    bl_options = {"UNDO"}
+    bl_options = {"UNDO", "INTERNAL"}  # which F3, that knows no name to give it, leaves out
 
     object_name: bpy.props.StringProperty(name="Object", description="Its name", options={"SKIP_SAVE"})
 

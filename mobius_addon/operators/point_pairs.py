@@ -163,7 +163,7 @@ class MOBIUS_OT_select_pair(bpy.types.Operator):
 
     bl_idname = "mobius.select_pair"
     bl_label = "Select Point Pair"
-    bl_options = {"UNDO"}
+    bl_options = {"UNDO", "INTERNAL"}  # which F3, that knows no name to give it, leaves out
 
     pair: bpy.props.StringProperty(name="Pair", description="Its name", options={"SKIP_SAVE"})
 

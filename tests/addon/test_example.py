@@ -40,6 +40,18 @@ def test_undo_takes_the_example_back(empty_scene: Any) -> None:
     assert everything() == before
 
 
+def test_undo_brings_a_removed_example_back(empty_scene: Any) -> None:
+    bpy.ops.mobius.load_example("EXEC_DEFAULT", True)
+    before, chosen = everything(), empty_scene.mobius.source.name
+    bpy.ops.mobius.remove_example("EXEC_DEFAULT", True)
+    assert everything() != before
+    bpy.ops.ed.undo()
+    assert everything() == before
+    assert bpy.context.scene.mobius.source.name == chosen
+    bpy.ops.ed.redo()
+    assert chosen not in bpy.data.objects
+
+
 def test_the_guide_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)

@@ -15,6 +15,7 @@ _PASSING = {
     "frame_duration", "has_data", "depsgraph", "bindcode", "library_weak_reference", "eval_time", "execution_time",
     "users_scene", "users_collection", "children_recursive", "pixels", "uv_layer_clone", "uv_layer_stencil",
     "vertex_selection", "edge_selection", "pin", "pin_uv", "select_edge", "is_library_indirect",
+    "particle_edit",  # whose object Blender sets when it evaluates
     "uv_sculpt",  # which ends Blender 4.2
 }  # fmt: skip
 _PATHS = {"FILE_PATH", "DIR_PATH", "FILEPATH", "DIRPATH"}
@@ -26,6 +27,13 @@ def whole_file(path: Path) -> dict[Block, Fields]:
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
+    return whole_session()
+
+
+def whole_session() -> dict[Block, Fields]:
+    """Return the fields of each data-block that is open, as `whole_file` does."""
+    import bpy
+
     bpy.context.view_layer.update()
     found: dict[Block, Fields] = {}
     for prop in bpy.data.bl_rna.properties:
