@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..solver.surface.mesh import Floats
+from .comparison import is_copy
 
 # type and color of the shading that viewports had before they showed our colors; of the session
 _before: dict[int, tuple[str, str]] = {}
@@ -27,6 +28,8 @@ class _View:
     perspective: str
     shading: tuple[str, str]
     overlay: tuple[bool, bool]
+    shown: frozenset[int] | None
+    """Numbers of the session of the objects that it was in local view of, None if it was in none."""
 
 
 _alone: dict[int, _View] = {}
@@ -130,9 +133,9 @@ def look_at_selected_alone(context: bpy.types.Context, places: Floats) -> None:
     """
     space = space_of(context)
     if space is not None:
+        _alone.setdefault(space.as_pointer(), _view_of(context, space))
         if space.local_view:
             _toggle_local_view(context)
-        _alone.setdefault(space.as_pointer(), _view_of(context, space))
         _toggle_local_view(context)
         with _in_viewport(context):
             _fill(bpy.context, places)
@@ -165,14 +168,18 @@ def looks_at_some_alone() -> bool:
 
 def look_at_all_again(context: bpy.types.Context) -> None:
     """Leave the view of some objects alone in every viewport that was made to look so; show all as it was before."""
-    if not _alone and (space := space_of(context)) is not None and space.local_view:  # since a file was opened
-        _toggle_local_view(context)
+    if not _alone and (space := space_of(context)) is not None and space.local_view:
+        shown = _shown_alone(context, space)  # of copies, since a file was opened; what a person looks at stays
+        if all(is_copy(obj) for obj in context.view_layer.objects if obj.session_uid in shown):
+            _toggle_local_view(context)
     for window, area, space in _viewports(context):
         before = _alone.pop(space.as_pointer(), None)
         if before is None:
             continue
         if space.local_view:
             _toggle_in(context, window, area)
+        if before.shown is not None:
+            _show_alone(context, window, area, before.shown)
         _look(context, space, before)
         if before.shading[1] != "VERTEX":
             _before.pop(space.as_pointer(), None)
@@ -199,12 +206,8 @@ def put_back(context: bpy.types.Context, away: Away, objects: Sequence[bpy.types
         if space.as_pointer() not in known:
             continue
         before, then, shading = known[space.as_pointer()]
-        if not space.local_view:
-            _toggle_in(context, window, area)
-            if not space.local_view:
-                continue
-            for obj in window.view_layer.objects:
-                obj.local_view_set(space, obj in objects)
+        if not _show_alone(context, window, area, {obj.session_uid for obj in objects}):
+            continue
         _look(context, space, then, force=True)
         _alone[space.as_pointer()] = before
         if shading is not None:
@@ -230,6 +233,22 @@ def _toggle_in(context: bpy.types.Context, window: bpy.types.Window, area: bpy.t
         bpy.ops.view3d.localview(frame_selected=False)
 
 
+def _show_alone(context: bpy.types.Context, window: Any, area: Any, shown: Set[int]) -> bool:
+    """Have an area's viewport be in local view of objects, by their numbers of the session; return whether it is."""
+    space, layer = area.spaces.active, window.view_layer
+    there = [obj for obj in layer.objects if obj.session_uid in shown]
+    if not space.local_view and there:
+        was_selected = there[0].select_get(view_layer=layer)
+        there[0].select_set(True, view_layer=layer)  # Blender enters it with what is selected, and not with nothing
+        _toggle_in(context, window, area)
+        there[0].select_set(was_selected, view_layer=layer)
+    if not space.local_view:
+        return False
+    for obj in layer.objects:
+        obj.local_view_set(space, obj in there)
+    return True
+
+
 def _viewports(context: bpy.types.Context) -> Iterator[tuple[Any, Any, Any]]:
     """Yield window, area and space of all 3D viewports that are shown."""
     for window in context.window_manager.windows:
@@ -247,6 +266,16 @@ def _view_of(context: bpy.types.Context, space: bpy.types.SpaceView3D) -> _View:
         view.view_perspective,
         (space.shading.type, space.shading.color_type),
         (overlay.matches, overlay.legend),
+        _shown_alone(context, space) if space.local_view else None,
+    )
+
+
+def _shown_alone(context: bpy.types.Context, space: bpy.types.SpaceView3D) -> frozenset[int]:
+    """Return the numbers of the session of the objects that a local view shows."""
+    drawn = context.evaluated_depsgraph_get()  # without a window Blender knows it of evaluated objects only
+    either = ((obj, obj.evaluated_get(drawn)) for obj in context.view_layer.objects)
+    return frozenset(
+        obj.session_uid for obj, shown in either if obj.local_view_get(space) or shown.local_view_get(space)
     )
 
 
