@@ -20,7 +20,8 @@ def looking(pair: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     window = bpy.context.window_manager.windows[0]
     area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
-    monkeypatch.setattr(viewport, "space_of", lambda _context: area.spaces.active)
+    for asked in (viewport, viewport.alone):
+        monkeypatch.setattr(asked, "space_of", lambda _context: area.spaces.active)
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.view3d.localview(frame_selected=False)
         yield area.spaces.active
