@@ -30,6 +30,7 @@ def steps() -> Wait:
     yield from searched(names)
     assert bpy.ops.mobius.align("EXEC_DEFAULT", True, **QUICK) == {"FINISHED"}
     bpy.ops.mobius.heat_map("EXEC_DEFAULT", True, measure="confidence")
+    yield from own_local_view(names)
     yield from second_window(names)
     yield from mended(names)
     yield from linked(names)
@@ -115,6 +116,37 @@ def modes(names: tuple[str, str]) -> Wait:
             assert not operator.poll(), operator
         bpy.ops.object.mode_set(mode="OBJECT")
         assert bpy.ops.mobius.align.poll()
+
+
+def own_local_view(names: tuple[str, str]) -> Wait:
+    """A person's local view is there again when Side by Side ends, also if the file was saved meanwhile."""
+    source = bpy.data.objects[names[0]]
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == source)
+    area = max((x for x in bpy.context.screen.areas if x.type == "VIEW_3D"), key=lambda x: x.width)
+    space, whole = area.spaces.active, next(x for x in area.regions if x.type == "WINDOW")
+
+    def seen() -> set[str]:
+        return {obj.name for obj in bpy.context.view_layer.objects if obj.visible_in_viewport_get(space)}
+
+    with bpy.context.temp_override(area=area, region=whole):
+        bpy.ops.view3d.localview(frame_selected=False)
+        yield 0.5
+        assert seen() == {source.name}
+        bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
+    yield 0.5
+    path = SHOTS / "own-local-view.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    path.unlink()
+    assert len(seen()) == 2
+    assert source.name not in seen()
+    with bpy.context.temp_override(area=area, region=whole):
+        bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
+        yield 0.5
+        assert space.local_view is not None
+        assert seen() == {names[0]}
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 0.5
 
 
 def second_window(names: tuple[str, str]) -> Wait:
