@@ -127,24 +127,26 @@ def own_local_view(names: tuple[str, str]) -> Wait:
     space, whole = area.spaces.active, next(x for x in area.regions if x.type == "WINDOW")
 
     def seen() -> set[str]:
-        return {obj.name for obj in bpy.context.view_layer.objects if obj.visible_in_viewport_get(space)}
+        drawn = bpy.context.evaluated_depsgraph_get()  # Blender 4.3 knows it of these
+        objects = bpy.context.view_layer.objects
+        return {obj.name for obj in objects if obj.evaluated_get(drawn).visible_in_viewport_get(space)}
 
     with bpy.context.temp_override(area=area, region=whole):
         bpy.ops.view3d.localview(frame_selected=False)
         yield 0.5
-        assert seen() == {source.name}
+        assert seen() == {source.name}, seen()
         bpy.ops.mobius.side_by_side("EXEC_DEFAULT", True)
     yield 0.5
     path = SHOTS / "own-local-view.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
     path.unlink()
-    assert len(seen()) == 2
+    assert len(seen()) == 2, seen()
     assert source.name not in seen()
     with bpy.context.temp_override(area=area, region=whole):
         bpy.ops.mobius.end_side_by_side("EXEC_DEFAULT", True)
         yield 0.5
         assert space.local_view is not None
-        assert seen() == {names[0]}
+        assert seen() == {names[0]}, seen()
         bpy.ops.view3d.localview(frame_selected=False)
     yield 0.5
 
