@@ -94,6 +94,7 @@ GERMAN_SENTENCES = {
     "The UV map '{}' of '{}' {}": "Die UV-Map „{}“ von „{}“ {}",
     "The mask of '{}' excludes every vertex: choose another one or invert it": "Die Maske von „{}“ schließt jeden Punkt aus: Eine andere wählen oder umkehren",
     "The picture '{}' is missing or cannot be read{}: find it (File > External Data > Find Missing Files)": "Das Bild „{}“ fehlt oder ist nicht zu lesen{}: Suchen (Datei > Externe Daten > Fehlende Dateien suchen)",
+    "The tile {} of the picture '{}' is empty: fill it or remove it": "Die Kachel {} des Bilds „{}“ ist leer: Sie füllen oder entfernen",
     "The tile {} of the picture '{}' is missing ('{}'): find its file": "Die Kachel {} des Bilds „{}“ fehlt („{}“): Die Datei suchen",
     "the transfer map has no tile {}, where the UV map '{}' has faces": "Die Übertragungskarte hat keine Kachel {}, wo die UV-Map „{}“ Flächen hat",
     "there is no file '{}'": "Es gibt keine Datei „{}“",
