@@ -287,7 +287,7 @@ def test_tiles_that_were_never_saved_are_read(empty_scene: Any) -> None:
     assert image.filepath == ""
     image.pack()
     assert {number: color_of(pixels) for number, pixels in read_tiles(image).items()} == {1001: RED, 1002: GREEN}
-    with pytest.raises(Refusal, match="The tile 1002 of the picture .* is empty: fill it"):
+    with pytest.raises(Refusal, match=r"The tile 1002 of the picture .* is empty: fill it"):
         read_tiles(tiled(RED, None))
 
 
