@@ -102,6 +102,7 @@ GERMAN_SENTENCES = {
     "{} of '{}' ({} of its area) {} no certain counterpart": "{} von „{}“ ({} der Fläche) {} kein sicheres Gegenstück",
     "{} of '{}' does not lie in its UV map '{}', which a transfer map is for: carry it without one": "{} von „{}“ liegt nicht in der UV-Map „{}“, für die eine Übertragungskarte ist: Ohne eine übertragen",
     "'{}' counts in the shape of '{}', without {}: to align it in another one, pin that shape key": "„{}“ zählt in der Form von „{}“, ohne {}: Um es in einer anderen auszurichten, diesen Formschlüssel anheften",
+    "'{}' counts without what its modifiers {} show: apply them if that should count": "„{}“ zählt ohne das, was seine Modifikatoren {} zeigen: Sie anwenden, wenn es zählen soll",
     "'{}' has different scales along its axes, which are ignored: apply the scale if it should count": "„{}“ hat verschiedene Skalierungen längs der Achsen, die nicht zählen: Die Skalierung anwenden, wenn sie zählen soll",
     "'{}': {} no counterpart on '{}': vertex groups and shape keys come from the surface next to them, all else stays as it is": "„{}“: {} kein Gegenstück auf „{}“: Punktgruppen und Formschlüssel kommen von der Fläche daneben, alles andere bleibt, wie es ist",
     "'{}': {} no counterpart on '{}'": "„{}“: {} kein Gegenstück auf „{}“",
