@@ -17,6 +17,9 @@ from ..mesh_data import Refusal
 
 FIRST_TILE = 1001
 
+# older Blender has no such choice
+_AS_COPY: Any = {"save_copy": True} if "save_copy" in bpy.types.Image.bl_rna.functions["save"].parameters else {}
+
 
 def read_tiles(image: Any) -> dict[int, Pixels]:
     """Return a picture's tiles, (height, width, channels) uint8 or float32, by UDIM number; without tiles it is 1001.
@@ -54,9 +57,14 @@ def read_tiles(image: Any) -> dict[int, Pixels]:
 def _held(image: Any, folder: Path) -> dict[int, Path]:
     """Return files in a folder, by UDIM number, with the tiles as Blender has them in memory, painted and not saved."""
     pattern = str(folder / "held.<UDIM>")
+    path, dirty = image.filepath_raw, image.is_dirty
     # of several tiles Blender gives no other access to the pixels; it stops at one that is empty or gone
     with suppress(RuntimeError):
-        image.save(filepath=pattern, save_copy=True)
+        image.save(filepath=pattern, **_AS_COPY)
+    if not _AS_COPY:  # it counts as saved now, and Blender would quit without asking
+        image.filepath_raw = path
+        if dirty and not image.is_dirty:
+            image.pixels[0] = image.pixels[0]
     files = {tile.number: Path(tile_path(pattern, tile.number)) for tile in image.tiles}
     return {number: path for number, path in files.items() if path.is_file()}
 

@@ -307,6 +307,7 @@ def test_what_was_painted_on_tiles_and_not_saved_is_read_and_stays_unsaved(
     assert image.is_dirty
     found = {number: color_of(pixels) for number, pixels in read_tiles(image).items()}
     assert found == {1001: BLUE, 1002: (1, 1, 1, 1)}
+    assert (image.packed_file is not None) == packed
     assert image.is_dirty  # so that Blender asks before it quits
     assert image.filepath == str(tmp_path / "skin.<UDIM>.png")
     assert (tmp_path / "skin.1001.png").read_bytes() == png_bytes(np.full((32, 32, 4), 255, np.uint8))
