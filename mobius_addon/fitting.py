@@ -87,7 +87,12 @@ def surface_rest(source: bpy.types.Object, surface: Surface) -> Floats:
 
 
 def _shear(obj: bpy.types.Object, like: bpy.types.Object) -> None:
-    """Give a new object's mesh the shear that another has by its parents' scales, which no object has by itself."""
+    """Give a new object's mesh the shear that another has by its parents' scales, which no object has by itself.
+
+    None by a scale of 0 along an axis: the object has that too, and its mesh would lose what lies along it.
+    """
+    if np.linalg.matrix_rank(np.array(like.matrix_world, np.float32)[:3, :3]) < 3:
+        return
     shear = obj.matrix_basis.inverted_safe() @ like.matrix_world
     if not np.allclose(shear, np.eye(4), atol=1e-5):  # some roundings of float32
         obj.data.transform(shear, shape_keys=True)

@@ -159,8 +159,27 @@ def mirrored(obj: bpy.types.Object, vectors: npt.NDArray[Any]) -> Floats:
 
 
 def unseen_warning(obj: bpy.types.Object) -> str | None:
-    """Return a sentence if an object looks other than what is read of it, by a scale or the sliders of its keys."""
-    return scale_warning(obj) or shape_warning(obj)
+    """Return a sentence if an object looks other than what is read of it: a scale, sliders of keys, or modifiers."""
+    return scale_warning(obj) or shape_warning(obj) or modifier_warning(obj)
+
+
+_OTHER_SURFACE = ("ARRAY", "BOOLEAN", "BUILD", "EXPLODE", "MASK", "MIRROR", "SCREW", "SKIN")
+"""Modifiers that, by what they are for, show more surface than the mesh has or less."""
+
+
+def modifier_warning(obj: bpy.types.Object) -> str | None:
+    """Return a sentence if modifiers show more surface of an object than is read of it, or less, else None."""
+    shown = [modifier for modifier in obj.modifiers if modifier.show_viewport]
+    found = [modifier for modifier in shown if modifier.type in _OTHER_SURFACE]
+    if not found and {modifier.type for modifier in shown} in ({"NODES"}, {"NODES", "ARMATURE"}):
+        # armatures keep the faces
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        if len(evaluated.data.polygons) != len(obj.data.polygons):
+            found = [modifier for modifier in shown if modifier.type == "NODES"]
+    if not found:
+        return None
+    names = ", ".join(f"'{modifier.name}'" for modifier in found)
+    return f"'{obj.name}' counts without what its modifiers {names} show: apply them if that should count"
 
 
 def shape_warning(obj: bpy.types.Object) -> str | None:

@@ -69,12 +69,16 @@ def _instance_with(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.O
 def _why_not_read(obj: bpy.types.Object) -> str | None:
     """Return why the mesh of an object cannot be read, or None if it can."""
     if obj.mode != "OBJECT":
-        mode = obj.mode.replace("_", " ").title()
-        return rpt_("'{}' is in {} Mode: switch to Object Mode first").format(obj.name, mode)
+        return _in_mode(obj)
     if obj.data.is_editmode:
         text = rpt_("'{}' shares its mesh with an object in Edit Mode: switch to Object Mode first")
         return text.format(obj.name)
     return None
+
+
+def _in_mode(obj: bpy.types.Object) -> str:
+    mode = obj.mode.replace("_", " ").title()
+    return rpt_("'{}' is in {} Mode: switch to Object Mode first").format(obj.name, mode)
 
 
 def why_not_written(obj: bpy.types.Object) -> str | None:
@@ -138,6 +142,17 @@ def why_not_mode(context: bpy.types.Context) -> str | None:
 def why_not_object_mode(context: bpy.types.Context) -> str | None:
     """Return why what goes through Edit Mode or shows other objects cannot be done now, or None if it can."""
     return None if context.mode == "OBJECT" else rpt_("Switch to Object Mode first")
+
+
+def why_not_alone(context: bpy.types.Context, obj: bpy.types.Object) -> str | None:
+    """Return why an object cannot be edited without another one, or None if it can.
+
+    Objects that are in Edit Mode without being active, as they can be in a view layer, are edited with the active one.
+    """
+    others = (other for other in context.view_layer.objects if other != obj and other.mode == "EDIT")
+    if (other := next(others, None)) is None:
+        return None
+    return _in_mode(other)
 
 
 def why_not_pair(context: bpy.types.Context, *, writes_source: bool, writes_target: bool = True) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,9 @@ from ..mesh_data import Refusal
 
 FIRST_TILE = 1001
 
+# older Blender has no such choice
+_AS_COPY: Any = {"save_copy": True} if "save_copy" in bpy.types.Image.bl_rna.functions["save"].parameters else {}
+
 
 def read_tiles(image: Any) -> dict[int, Pixels]:
     """Return a picture's tiles, (height, width, channels) uint8 or float32, by UDIM number; without tiles it is 1001.
@@ -24,24 +27,46 @@ def read_tiles(image: Any) -> dict[int, Pixels]:
     Raises
     ------
     Refusal
-        The picture's file is missing or cannot be read.
+        The picture's file is missing or cannot be read, or a tile is empty.
     """
     if image.source != "TILED":
         return {FIRST_TILE: _pixels(image, image)}
     found = {}
     with tempfile.TemporaryDirectory(dir=bpy.app.tempdir) as folder:
         packed = {x.tile_number: x for x in image.packed_files} if image.packed_file is not None else {}
-        for number in [tile.number for tile in image.tiles]:
-            if number in packed:
-                path = Path(folder, Path(packed[number].filepath).name)
+        named = bpy.path.abspath(image.filepath, library=image.library)
+        on_disk = {tile.number: Path(tile_path(named, tile.number)) for tile in image.tiles}
+        held: dict[int, Path] = {}
+        if image.is_dirty or not all(number in packed or path.is_file() for number, path in on_disk.items()):
+            held = _held(image, Path(folder))
+        for number, path in on_disk.items():
+            if number in held:
+                path = held[number]
+            elif number in packed:
+                path = Path(folder, f"packed.{number}{Path(packed[number].filepath).suffix}")
                 path.write_bytes(packed[number].packed_file.data)
-            else:
-                path = Path(tile_path(bpy.path.abspath(image.filepath, library=image.library), number))
-            if not path.is_file():
+            elif not named:
+                raise Refusal(f"The tile {number} of the picture '{image.name}' is empty: fill it or remove it")
+            elif not path.is_file():
                 raise Refusal(f"The tile {number} of the picture '{image.name}' is missing ('{path}'): find its file")
             with _loaded(path, image) as tile:
                 found[number] = _pixels(tile, image)
     return found
+
+
+def _held(image: Any, folder: Path) -> dict[int, Path]:
+    """Return files in a folder, by UDIM number, with the tiles as Blender has them in memory, painted and not saved."""
+    pattern = str(folder / "held.<UDIM>")
+    path, dirty = image.filepath_raw, image.is_dirty
+    # of several tiles Blender gives no other access to the pixels; it stops at one that is empty or gone
+    with suppress(RuntimeError):
+        image.save(filepath=pattern, **_AS_COPY)
+    if not _AS_COPY:  # it counts as saved now, and Blender would quit without asking
+        image.filepath_raw = path
+        if dirty and not image.is_dirty:
+            image.pixels[0] = image.pixels[0]
+    files = {tile.number: Path(tile_path(pattern, tile.number)) for tile in image.tiles}
+    return {number: path for number, path in files.items() if path.is_file()}
 
 
 def tile_path(path: str, number: int) -> str:

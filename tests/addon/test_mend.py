@@ -178,3 +178,22 @@ def test_faces_that_are_hidden_are_not_left_behind() -> None:
         polygon.hide = False
     assert mend(obj, "flip") == {"FINISHED"}
     assert [polygon.normal.z < 0 for polygon in obj.data.polygons] == upwards
+
+
+@pytest.mark.parametrize("how", [x.identifier for x in REMEDIES])
+def test_another_mesh_in_edit_mode_is_not_mended_along(how: str) -> None:
+    """Blender's tools of Edit Mode work on all that are in it: the other's selected vertices would be deleted."""
+    obj = sheet(lambda i, j: (i, j) != (5, 5) and j != 8)
+    obj.data.edges[0].use_seam = True
+    other = make_sheet("Other", 6)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.context.mode == "OBJECT"
+    with pytest.raises(RuntimeError, match="'Other' is in Edit Mode: switch to Object Mode first"):
+        bpy.ops.mobius.mend(object_name=obj.name, how=how)
+    assert (other.mode, obj.mode) == ("EDIT", "OBJECT")
+    other.update_from_editmode()
+    assert len(other.data.vertices) == 36
+    assert bpy.ops.mobius.check(object_name=obj.name, edit=True) == {"FINISHED"}
+    assert (other.mode, obj.mode) == ("EDIT", "OBJECT")

@@ -151,3 +151,33 @@ def test_sliders_that_show_another_shape_are_pointed_out() -> None:
     obj.show_only_shape_key = False
     obj.active_shape_key.mute = True
     assert unseen_warning(obj) is None
+
+
+def grid_nodes() -> Any:
+    """Nodes that put another mesh in the place of the one that comes in."""
+    group = bpy.data.node_groups.new("Grid", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group.nodes.new("NodeGroupInput")
+    grid, end = group.nodes.new("GeometryNodeMeshGrid"), group.nodes.new("NodeGroupOutput")
+    group.links.new(grid.outputs["Mesh"], end.inputs[0])
+    return group
+
+
+@pytest.mark.parametrize("kind", ["MIRROR", "ARRAY", "MASK", "NODES"])
+def test_modifiers_that_show_another_surface_are_named(kind: str) -> None:
+    obj = make_sheet("Sheet", 5)
+    obj.modifiers.new("Bend", "SIMPLE_DEFORM")
+    obj.modifiers.new("Smooth", "SUBSURF")
+    assert unseen_warning(obj) is None
+    obj.modifiers.clear()
+    found = obj.modifiers.new("Made", kind)
+    if kind == "NODES":
+        assert unseen_warning(obj) is None  # they do nothing yet
+        found.node_group = grid_nodes()
+        bpy.context.view_layer.update()
+    assert unseen_warning(obj) == (
+        "'Sheet' counts without what its modifiers 'Made' show: apply them if that should count"
+    )
+    found.show_viewport = False
+    assert unseen_warning(obj) is None

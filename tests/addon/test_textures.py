@@ -256,6 +256,63 @@ def test_pictures_and_tiles_on_disk_are_read_as_packed_ones_are(sheets: tuple[An
         carry(source, target)
 
 
+def tiled(*colors: Any) -> Any:
+    """A picture with tiles that is made in Blender and not saved, a color each; None leaves one empty."""
+    image = bpy.data.images.new("Painted", 32, 32, tiled=True)
+    for number, color in enumerate(colors, 1001):
+        if number > 1001:
+            image.tiles.new(number)
+        if color is not None:
+            fill(image, number, color)
+    return image
+
+
+def fill(image: Any, number: int, color: Any) -> None:
+    image.tiles.active_index = [tile.number for tile in image.tiles].index(number)
+    with bpy.context.temp_override(edit_image=image):
+        bpy.ops.image.tile_fill(color=color, width=32, height=32, float=False, alpha=True)
+
+
+RED, GREEN, BLUE = (1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)
+
+
+def color_of(pixels: np.ndarray) -> tuple[int, ...]:
+    assert (pixels == pixels[0, 0]).all()
+    return tuple(round(value / 255) for value in pixels[0, 0].tolist())
+
+
+def test_tiles_that_were_never_saved_are_read(empty_scene: Any) -> None:
+    image = tiled(RED, GREEN)
+    assert {number: color_of(pixels) for number, pixels in read_tiles(image).items()} == {1001: RED, 1002: GREEN}
+    assert image.filepath == ""
+    image.pack()
+    assert {number: color_of(pixels) for number, pixels in read_tiles(image).items()} == {1001: RED, 1002: GREEN}
+    with pytest.raises(Refusal, match=r"The tile 1002 of the picture .* is empty: fill it"):
+        read_tiles(tiled(RED, None))
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_what_was_painted_on_tiles_and_not_saved_is_read_and_stays_unsaved(
+    empty_scene: Any, tmp_path: Path, packed: bool
+) -> None:
+    for number in (1001, 1002):
+        (tmp_path / f"skin.{number}.png").write_bytes(png_bytes(np.full((32, 32, 4), 255, np.uint8)))
+    image = bpy.data.images.load(str(tmp_path / "skin.1001.png"))
+    image.source, image.filepath = "TILED", str(tmp_path / "skin.<UDIM>.png")
+    if 1002 not in {tile.number for tile in image.tiles}:
+        image.tiles.new(1002)
+    if packed:
+        image.pack()
+    image.pixels.foreach_set(np.tile(np.array(BLUE, np.float32), 32 * 32))  # of the first tile
+    assert image.is_dirty
+    found = {number: color_of(pixels) for number, pixels in read_tiles(image).items()}
+    assert found == {1001: BLUE, 1002: (1, 1, 1, 1)}
+    assert (image.packed_file is not None) == packed
+    assert image.is_dirty  # so that Blender asks before it quits
+    assert image.filepath == str(tmp_path / "skin.<UDIM>.png")
+    assert (tmp_path / "skin.1001.png").read_bytes() == png_bytes(np.full((32, 32, 4), 255, np.uint8))
+
+
 def test_a_transfer_map_of_several_tiles_draws_what_the_transfer_drew(sheets: tuple[Any, Any]) -> None:
     source, _ = sheets
     color, slopes = smooth(4, 6), smooth(3, 7) // 4 + 96

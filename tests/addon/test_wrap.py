@@ -164,3 +164,23 @@ def test_it_lies_on_a_target_that_its_parent_shears(bent: tuple[Any, Any], scale
     bpy.context.view_layer.update()
     assert np.allclose(in_world(made(), "Basis"), in_world(target), atol=1e-4)
     assert (everything(source), everything(target)) == before
+
+
+@pytest.mark.parametrize("fitted", ["source", "target"])
+@pytest.mark.parametrize("parent", [False, True])
+def test_onto_a_target_without_height_the_mesh_keeps_its_own(bent: tuple[Any, Any], fitted: str, parent: bool) -> None:
+    """A scale of 0 can be taken back; what is gone from a mesh cannot."""
+    _, target = bent
+    flat = target
+    if parent:
+        flat = bpy.data.objects.new("Flat", None)
+        bpy.context.scene.collection.objects.link(flat)
+        target.parent = flat
+    assert bpy.ops.mobius.align(**QUICK) == {"FINISHED"}
+    assert bpy.ops.mobius.wrap(fitted=fitted) == {"FINISHED"}
+    wanted = positions(bpy.context.object)
+    flat.scale.z = 0
+    bpy.context.view_layer.update()
+    assert bpy.ops.mobius.wrap(fitted=fitted) == {"FINISHED"}
+    assert bpy.context.object.name.endswith(".001")
+    np.testing.assert_allclose(positions(bpy.context.object), wanted, atol=1e-5)
