@@ -17,7 +17,7 @@ from .. import topology_cache, viewport
 from ..mesh_data import foreach, read_surface, settle
 from ..options import repair
 from ..translation import told
-from ..usable import why_not, why_not_alone, why_not_object_mode
+from ..usable import why_not, why_not_object_mode
 
 
 class MOBIUS_OT_check(bpy.types.Operator):
@@ -84,7 +84,7 @@ class MOBIUS_OT_check(bpy.types.Operator):
         if self.select and trouble.any() and obj.data.is_editable:
             hidden = select_vertices(obj.data, trouble)
             context.tool_settings.mesh_select_mode = (True, False, False)
-            unseen = (why_not_alone(context, obj) or viewport.edit(context, obj)) if self.edit else None
+            unseen = viewport.edit(context, obj) if self.edit else None
             found_there = rpt_("{} ({:,} vertices are selected: see them in Edit Mode)")
             line = found_there.format(line, int(trouble.sum()) - hidden)
             tell_unseen(self.report, obj.name, hidden, unseen)

@@ -19,7 +19,7 @@ from ...solver.surface.mesh import Booleans
 from .. import viewport
 from ..mesh_data import Refusal, foreach, read_surface, settle
 from ..translation import told
-from ..usable import why_not, why_not_alone, why_not_object_mode
+from ..usable import why_not, why_not_object_mode
 from .check import outside_largest_part, select_vertices
 
 
@@ -131,8 +131,6 @@ def _mend(context: bpy.types.Context, obj: bpy.types.Object, how: str) -> None:
     if how == "cut" and not foreach(obj.data.edges, "use_seam", 1, np.bool_).any():
         text = rpt_("'{}' has no seams: mark the edges to cut along in Edit Mode (Edge > Mark Seam)")
         raise Refusal(text.format(obj.name))
-    if reason := why_not_alone(context, obj):
-        raise Refusal(reason)
     own = obj.data
     if any(foreach(elements, "hide", 1, np.bool_).any() for elements in (own.vertices, own.edges, own.polygons)):
         # Edit Mode's tools leave it out: half of the faces would be turned, say

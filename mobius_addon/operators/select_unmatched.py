@@ -11,7 +11,7 @@ from ..attributes import mask_weights, unmatched_vertices
 from ..mesh_data import Refusal, foreach, read_surface, settle
 from ..options import SourceMaskOptions, source_mask
 from ..translation import told
-from ..usable import why_not_aligned, why_not_alone
+from ..usable import why_not_aligned
 from .check import select_vertices, tell_unseen
 
 
@@ -56,9 +56,7 @@ class MOBIUS_OT_select_unmatched(SourceMaskOptions, bpy.types.Operator):
             chosen = unmatched | foreach(target.data.vertices, "select", 1, np.bool_)
         hidden = select_vertices(target.data, chosen)
         context.tool_settings.mesh_select_mode = (True, False, False)
-        unseen = None
-        if self.edit and chosen.any():
-            unseen = why_not_alone(context, target) or viewport.edit(context, target)
+        unseen = viewport.edit(context, target) if self.edit and chosen.any() else None
         tell_unseen(self.report, target.name, hidden, unseen)
         number = plural(int(unmatched.sum()), "vertex")
         share = surfaces[1].mesh.vertex_areas[unmatched].sum() / surfaces[1].mesh.area

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..usable import why_not_alone
 from .which import in_viewport, space_of
 
 
@@ -16,6 +17,8 @@ def edit(context: bpy.types.Context, obj: bpy.types.Object, *, look: bool = True
     str or None
         Why that is not possible, and nothing was done; None if it was.
     """
+    if reason := why_not_alone(context, obj):
+        return reason
     layer, space = context.view_layer, space_of(context)
     layer.update()
     if layer.objects.get(obj.name) != obj:
