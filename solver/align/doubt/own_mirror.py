@@ -79,8 +79,8 @@ def mirror_plane(onto: SurfacePoints) -> tuple[Floats, Floats] | None:
 
 
 def mirrored(points: Floats, normal: Floats, middle: Floats) -> Floats:
-    """Return points, (n, 3), mirrored in a plane."""
-    return points - 2 * ((points - middle) @ normal)[:, None] * normal
+    """Return points, (..., 3), mirrored in planes, each a unit normal and a point, (..., 3)."""
+    return points - 2 * ((points - middle) * normal).sum(axis=-1, keepdims=True) * normal
 
 
 def _few(own: OwnFit) -> slice:
@@ -96,7 +96,7 @@ def _borne_out(own: OwnFit, some: slice, normal: Floats, middle: Floats) -> tupl
 
 
 def _turned(normals: Floats, across: Floats) -> Floats:
-    return normals - 2 * (normals @ across)[:, None] * across
+    return mirrored(normals, across, np.zeros(3))
 
 
 def _likely(own: OwnFit) -> Iterator[tuple[Floats, Floats]]:
@@ -138,11 +138,9 @@ def _roughly(
     Vertices near their mirror images, (k, q), -1 where these do not lie on the surface; and, (k,) each, which share of
     the images does, of those not past a boundary, and of all.
     """
-    away = ((points - middle[:, None]) * normal[:, None]).sum(axis=2)
-    image = points - 2 * away[..., None] * normal[:, None]
-    turned = facing - 2 * (facing @ normal.T).T[..., None] * normal[:, None]
-    lies, beyond, near = own.roughly(image, turned)
-    told = (np.abs(away) > ASIDE) & ~beyond
+    image = mirrored(points, normal[:, None], middle[:, None])
+    lies, beyond, near = own.roughly(image, _turned(facing, normal[:, None]))
+    told = (np.linalg.norm(image - points, axis=2) > 2 * ASIDE) & ~beyond
     lies &= told
     borne_out = np.count_nonzero(lies, axis=1) / np.maximum(np.count_nonzero(told, axis=1), 1)
     return np.where(lies, near, -1), borne_out, lies.mean(axis=1)
