@@ -64,7 +64,6 @@ _register, _unregister = register_factory(
 def _forget(*_: object) -> None:
     align.forget_last()
     viewport.forget_views()
-    viewport.forget_shading()
     _forget_refused()
 
 

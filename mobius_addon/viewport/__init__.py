@@ -9,7 +9,7 @@ from .alone import (
     put_away,
     put_back,
 )
-from .colors import close_later, forget_shading, show_as_before, show_colors, show_materials
+from .colors import close_later, show_as_before, show_colors, show_materials
 from .editing import edit, look_at_selected
 from .which import axes_of, largest_area, space_of
 
@@ -18,7 +18,6 @@ __all__ = [
     "axes_of",
     "close_later",
     "edit",
-    "forget_shading",
     "forget_views",
     "largest_area",
     "look_at_all_again",

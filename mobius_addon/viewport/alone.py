@@ -10,7 +10,7 @@ import bpy
 
 from ...solver.surface.mesh import Floats
 from ..comparison import is_copy
-from .colors import Shading, shade, shade_later, shading_before, shading_of
+from .colors import Shading, forget_shading, shade, shade_later, shading_before, shading_of
 from .which import axes_of, in_viewport, space_of, viewports
 
 
@@ -120,8 +120,9 @@ def put_back(context: bpy.types.Context, away: Away, objects: Sequence[bpy.types
 
 
 def forget_views() -> None:
-    """Forget how viewports looked before: they are gone."""
+    """Forget how viewports looked before, and what they showed: they are gone."""
     _alone.clear()
+    forget_shading()
 
 
 def _look(context: bpy.types.Context, space: bpy.types.SpaceView3D, how: _View, *, force: bool = False) -> None:

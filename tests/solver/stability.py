@@ -3,6 +3,7 @@
 import numpy as np
 
 from solver import AlignSettings, TriangleMesh, align, correspond
+from solver.surface.barycentric import interpolated
 
 SHIFT = 1e-9
 """Standard deviation of the noise, as a share of the diagonal."""
@@ -20,7 +21,7 @@ def shifted(mesh: TriangleMesh, seed: int) -> TriangleMesh:
 def places(source: TriangleMesh, target: TriangleMesh, settings: AlignSettings | None = None) -> np.ndarray:
     """Return where each target vertex goes on the source, (n, 3)."""
     found = correspond(align(source, target, settings))
-    return np.einsum("nk,nkd->nd", found.barycentric, source.vertices[source.faces[found.face]])
+    return interpolated(source.vertices, source.faces[found.face], found.barycentric)
 
 
 def apart(source: TriangleMesh, target: TriangleMesh, settings: AlignSettings | None = None) -> np.ndarray:

@@ -29,7 +29,7 @@ def sheet(seed: int, least: float = -0.45) -> TriangleMesh:
 
 @pytest.mark.parametrize(("seed", "least"), [*product(range(3), [-1.0, -0.45, -0.3]), (0, -0.22), (1, -0.22)])
 def test_the_plane_of_a_part_is_found(seed: int, least: float):
-    """Also where little of what is on one side is on the other too."""
+    """Also where little of what is on one side is on the other too: of the third sheet with least it is missed."""
     onto = ready(prepare(sheet(seed, least)).flattening)
     plane = mirror_plane(onto)
     assert plane is not None
